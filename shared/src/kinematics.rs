@@ -1,0 +1,271 @@
+//! Forward kinematics, the length of the bar and its gradient, in sweeps of vectors along the chain.
+//!
+//! No 4×4 products and no numerical differences. One sweep from the tool to the base carries the sphere; one sweep from the
+//! base to the tool carries the wrench of a unit force along the bar, and each parameter's column is one component of it.
+
+use crate::{Chain, JointKind, JointVector, MAX_JOINTS, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Real, Row, Vector3};
+
+/// Where the bar's two ends are: a chuck on the table and a sphere on the tool.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pairing<S> {
+    /// Centre of the chuck `c` in the base frame, metres.
+    pub chuck_base_m: Vector3<S>,
+    /// Centre of the sphere `s` in the tool (end-effector) frame, metres.
+    pub sphere_tool_m: Vector3<S>,
+}
+
+/// One settled length of the bar, and where the robot stood.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measurement<S> {
+    /// The bar's two ends.
+    pub pairing: Pairing<S>,
+    /// Encoder outputs, radians or metres.
+    pub q: JointVector<S>,
+    /// Measured length d, metres.
+    pub length_m: S,
+    /// Weight of the squared residual; 1 when all lengths are equally good.
+    pub weight: S,
+}
+
+/// A rigid pose: `point_base = rotation · point_tool + translation_m`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose<S> {
+    /// Rotation from the tool's axes to the base's.
+    pub rotation: Matrix3<S>,
+    /// Origin of the tool frame in the base frame, metres.
+    pub translation_m: Vector3<S>,
+}
+
+/// A chain made ready for many poses: all that depends on the parameters alone, computed once.
+#[derive(Clone, Debug)]
+pub struct Kinematics<S> {
+    joints: usize,
+    links: [LinkGeometry<S>; MAX_JOINTS + 1],
+    encoders: [Encoder<S>; MAX_JOINTS],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct LinkGeometry<S> {
+    translation_m: Vector3<S>,
+    /// `Rz(alpha) · Ry(beta) · Rx(gamma)`.
+    rotation: Matrix3<S>,
+    sin_alpha: S,
+    cos_alpha: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Encoder<S> {
+    kind: JointKind,
+    offset: S,
+    scale: S,
+}
+
+/// What a joint does at one pose.
+#[derive(Clone, Copy)]
+enum Motion<S> {
+    Turn { sin: S, cos: S },
+    Slide { distance_m: S },
+}
+
+impl<S: Real> Kinematics<S> {
+    /// Prepares `chain`: the sines, cosines and rotation of every link.
+    pub fn new(chain: &Chain<S>) -> Self {
+        let mut links = [LinkGeometry::identity(); MAX_JOINTS + 1];
+        for (i, geometry) in links.iter_mut().enumerate() {
+            if let Some(link) = chain.link(i) {
+                *geometry = LinkGeometry::new(link);
+            }
+        }
+        let mut encoders = [Encoder { kind: JointKind::Revolute, offset: S::zero(), scale: S::zero() }; MAX_JOINTS];
+        for (i, encoder) in encoders.iter_mut().enumerate() {
+            if let Some(joint) = chain.joint(i) {
+                *encoder = Encoder { kind: joint.kind, offset: joint.offset, scale: joint.scale };
+            }
+        }
+        Self { joints: chain.joints(), links, encoders }
+    }
+
+    /// Pose of the tool at encoder outputs `q`.
+    pub fn base_from_tool(&self, q: &JointVector<S>) -> Pose<S> {
+        let motions = self.motions(q);
+        let last = &self.links[self.joints];
+        // Two columns of the rotation and the origin travel to the base; the third column is their cross product.
+        let mut x_axis: Vector3<S> = last.rotation.column(0).into();
+        let mut y_axis: Vector3<S> = last.rotation.column(1).into();
+        let mut origin_m = last.translation_m;
+        for (link, motion) in self.links[..self.joints].iter().zip(&motions[..self.joints]).rev() {
+            x_axis = link.rotation * motion.direction(x_axis);
+            y_axis = link.rotation * motion.direction(y_axis);
+            origin_m = link.point(motion.point(origin_m));
+        }
+        Pose { rotation: Matrix3::from_columns(&[x_axis, y_axis, x_axis.cross(&y_axis)]), translation_m: origin_m }
+    }
+
+    /// Position in the base frame of a point of the tool, metres.
+    pub fn point_in_base(&self, q: &JointVector<S>, point_tool_m: &Vector3<S>) -> Vector3<S> {
+        self.sweep_out(&self.motions(q), point_tool_m)
+    }
+
+    /// Computed length `d = |T(q)·s − c|`, metres.
+    pub fn length(&self, q: &JointVector<S>, pairing: &Pairing<S>) -> S {
+        (self.point_in_base(q, &pairing.sphere_tool_m) - pairing.chuck_base_m).norm()
+    }
+
+    /// Computed length, metres, and its gradient `∂d/∂p` (the paper's eq. 9 with the sign that descends) into `row`, in metres
+    /// per metre, radian or one. Entries beyond the chain's parameters are left as they are.
+    ///
+    /// When the sphere's centre lies on the chuck's, where the length has no gradient, the row is zero.
+    pub fn length_gradient(&self, q: &JointVector<S>, pairing: &Pairing<S>, row: &mut Row<S>) -> S {
+        let motions = self.motions(q);
+        let bar_m = self.sweep_out(&motions, &pairing.sphere_tool_m) - pairing.chuck_base_m;
+        let length_m = bar_m.norm();
+        let along_bar = if length_m > S::zero() { bar_m / length_m } else { Vector3::zeros() };
+        // The bar's line of action passes through the chuck as well as the sphere, and the chuck is the exact one of the two.
+        let moment = pairing.chuck_base_m.cross(&along_bar);
+        self.sweep_wrench(q, &motions, along_bar, moment, row);
+        length_m
+    }
+
+    /// Residual `f = d_measured − d_computed`, metres, and the gradient of the computed length into `row`.
+    pub fn residual_row(&self, measurement: &Measurement<S>, row: &mut Row<S>) -> S {
+        measurement.length_m - self.length_gradient(&measurement.q, &measurement.pairing, row)
+    }
+
+    /// Residual `f = d_measured − d_computed`, metres.
+    pub fn residual(&self, measurement: &Measurement<S>) -> S {
+        measurement.length_m - self.length(&measurement.q, &measurement.pairing)
+    }
+
+    /// Columns of any force on the tool: for a point `p` of the tool at which the force acts, `∂(force·p)/∂parameters` into
+    /// `row`. Force and moment (about the base origin, `p × force`) are in the base frame.
+    pub fn wrench_columns(&self, q: &JointVector<S>, force_base: Vector3<S>, moment_base: Vector3<S>, row: &mut Row<S>) {
+        self.sweep_wrench(q, &self.motions(q), force_base, moment_base, row);
+    }
+
+    fn motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
+        let mut motions = [Motion::Slide { distance_m: S::zero() }; MAX_JOINTS];
+        for ((motion, encoder), q) in motions.iter_mut().zip(&self.encoders[..self.joints]).zip(&q.0) {
+            *motion = encoder.motion(*q);
+        }
+        motions
+    }
+
+    fn sweep_out(&self, motions: &[Motion<S>; MAX_JOINTS], point_tool_m: &Vector3<S>) -> Vector3<S> {
+        let mut point_m = self.links[self.joints].point(*point_tool_m);
+        for (link, motion) in self.links[..self.joints].iter().zip(&motions[..self.joints]).rev() {
+            point_m = link.point(motion.point(point_m));
+        }
+        point_m
+    }
+
+    /// Pushes a wrench from the base down the chain. In each frame on its way the wrench's components are the columns:
+    /// a translation's column is the force, a rotation's its moment about that rotation's axis, an offset's the z moment
+    /// (revolute) or z force (prismatic), and the scale's is `q` times the offset's.
+    fn sweep_wrench(
+        &self,
+        q: &JointVector<S>,
+        motions: &[Motion<S>; MAX_JOINTS],
+        mut force: Vector3<S>,
+        mut moment: Vector3<S>,
+        row: &mut Row<S>,
+    ) {
+        for (i, columns) in row.chunks_mut(PARAMETERS_PER_JOINT).take(self.joints + 1).enumerate() {
+            let link = &self.links[i];
+            columns[ParameterKind::X as usize] = force.x;
+            columns[ParameterKind::Y as usize] = force.y;
+            columns[ParameterKind::Z as usize] = force.z;
+            moment -= link.translation_m.cross(&force);
+            columns[ParameterKind::Alpha as usize] = moment.z;
+            // The axis of beta is y turned by alpha; that of gamma is the x axis that the whole rotation leaves behind.
+            columns[ParameterKind::Beta as usize] = link.cos_alpha * moment.y - link.sin_alpha * moment.x;
+            force = link.rotation.tr_mul(&force);
+            moment = link.rotation.tr_mul(&moment);
+            columns[ParameterKind::Gamma as usize] = moment.x;
+
+            if i < self.joints {
+                let column = match motions[i] {
+                    Motion::Turn { .. } => moment.z,
+                    Motion::Slide { .. } => force.z,
+                };
+                columns[ParameterKind::Offset as usize] = column;
+                columns[ParameterKind::Scale as usize] = column * q.0[i];
+                motions[i].push_wrench(&mut force, &mut moment);
+            }
+        }
+    }
+}
+
+impl<S: Real> LinkGeometry<S> {
+    fn new(link: crate::Link<S>) -> Self {
+        let (sa, ca) = link.alpha_rad.sine_cosine();
+        let (sb, cb) = link.beta_rad.sine_cosine();
+        let (sg, cg) = link.gamma_rad.sine_cosine();
+        let rotation = Matrix3::new(
+            ca * cb,
+            ca * sb * sg - sa * cg,
+            ca * sb * cg + sa * sg, //
+            sa * cb,
+            sa * sb * sg + ca * cg,
+            sa * sb * cg - ca * sg, //
+            -sb,
+            cb * sg,
+            cb * cg,
+        );
+        Self { translation_m: link.translation_m, rotation, sin_alpha: sa, cos_alpha: ca }
+    }
+
+    fn identity() -> Self {
+        Self { translation_m: Vector3::zeros(), rotation: Matrix3::identity(), sin_alpha: S::zero(), cos_alpha: S::one() }
+    }
+
+    /// A point of the distal frame in the proximal one.
+    fn point(&self, point_m: Vector3<S>) -> Vector3<S> {
+        self.rotation * point_m + self.translation_m
+    }
+}
+
+impl<S: Real> Encoder<S> {
+    fn motion(&self, q: S) -> Motion<S> {
+        let theta = self.offset + self.scale * q;
+        match self.kind {
+            JointKind::Revolute => {
+                let (sin, cos) = theta.sine_cosine();
+                Motion::Turn { sin, cos }
+            }
+            JointKind::Prismatic => Motion::Slide { distance_m: theta },
+        }
+    }
+}
+
+impl<S: Real> Motion<S> {
+    /// A direction behind the joint, seen from before it.
+    fn direction(&self, v: Vector3<S>) -> Vector3<S> {
+        match *self {
+            Self::Turn { sin, cos } => Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z),
+            Self::Slide { .. } => v,
+        }
+    }
+
+    /// A point behind the joint, seen from before it.
+    fn point(&self, p: Vector3<S>) -> Vector3<S> {
+        match *self {
+            Self::Turn { .. } => self.direction(p),
+            Self::Slide { distance_m } => Vector3::new(p.x, p.y, p.z + distance_m),
+        }
+    }
+
+    /// Turns a wrench from the frame before the joint into the one behind it.
+    fn push_wrench(&self, force: &mut Vector3<S>, moment: &mut Vector3<S>) {
+        match *self {
+            Self::Turn { sin, cos } => {
+                let back = Self::Turn { sin: -sin, cos };
+                *force = back.direction(*force);
+                *moment = back.direction(*moment);
+            }
+            Self::Slide { distance_m } => {
+                moment.x += distance_m * force.y;
+                moment.y -= distance_m * force.x;
+            }
+        }
+    }
+}

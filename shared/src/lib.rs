@@ -1,0 +1,49 @@
+//! What the ball-bar's board and host must agree on to the bit: the kinematic chain, the length of the bar and its gradient,
+//! and the incremental normal equations with their damped step.
+//!
+//! A number's way through this crate:
+//!
+//! ```text
+//! Chain ──Kinematics::new──▶ Kinematics ──residual_row(Measurement)──▶ residual f, row ∂d/∂p
+//!                                                                           │ NormalEquations::add
+//! new parameters ◀──Chain::apply── Step ◀──DampedSolver::solve(λ)── JᵀWJ, JᵀWf
+//! ```
+//!
+//! Units are SI throughout: metres, radians, newton-free wrenches (a unit force along the bar). Frames stand in the names:
+//! `base_from_tool` maps tool coordinates to base coordinates. Everything is generic over [`Real`], `f32` or `f64`; nothing
+//! allocates, nothing panics on bad numbers, and sizes are set at run time under [`MAX_JOINTS`].
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod chain;
+mod kinematics;
+mod normal;
+mod parameter;
+mod real;
+mod step;
+mod trig;
+
+pub use chain::{Chain, ChainError, Joint, JointKind, JointVector, Link};
+pub use kinematics::{Kinematics, Measurement, Pairing, Pose};
+pub use normal::{FreeParameters, FreeParametersError, FreeSetMismatch, NormalEquations};
+pub use parameter::{Parameter, ParameterKind, ParameterUnit, UnknownParameter};
+pub use real::Real;
+pub use step::{DampedSolver, Damping, NotPositiveDefinite, Step};
+pub use trig::sin_cos_f32;
+
+/// Three-vector of metres or of unit-free direction components.
+pub type Vector3<S> = nalgebra::Vector3<S>;
+/// Three-by-three matrix; rotations here map from the frame on the right of the name to the one on the left.
+pub type Matrix3<S> = nalgebra::Matrix3<S>;
+
+/// The most joints that a chain may have.
+pub const MAX_JOINTS: usize = 8;
+/// Parameters of one link and the joint behind it: `x y z alpha beta gamma offset scale`.
+pub const PARAMETERS_PER_JOINT: usize = 8;
+/// Parameters of the last link, which has no joint behind it.
+pub const PARAMETERS_OF_LAST_LINK: usize = 6;
+/// The most parameters that a chain may have: 8·J + 6.
+pub const MAX_PARAMETERS: usize = PARAMETERS_PER_JOINT * MAX_JOINTS + PARAMETERS_OF_LAST_LINK;
+
+/// One value for each parameter of a chain, in parameter order; entries beyond the chain's own count are zero.
+pub type Row<S> = [S; MAX_PARAMETERS];
