@@ -1,0 +1,376 @@
+//! `host-cal fit`: from measured poses to a calibrated robot.
+
+use std::path::PathBuf;
+
+use ballbar::Damping;
+use clap::{Args, ValueEnum};
+use miette::Diagnostic;
+use serde::Serialize;
+use thiserror::Error;
+
+use super::inputs::{Measured, MeasuredArgs, OutputArgs};
+use super::outcome::{CommandError, Outcome};
+use super::rank::NotIdentified;
+use super::report::{Report, print, warn};
+use super::table::Columns;
+use super::validate::{PairingLine, ResidualLine, largest, largest_text};
+use crate::files::{Calibration, Dataset, Rig, Robot, write_atomically};
+use crate::identify::{ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, remarks};
+use crate::units::{ScreenUnit, mm_from_m};
+
+/// Identify the robot's parameters from measured poses
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-cal fit --robot design.toml --rig rig.toml poses.csv --out calibrated.toml
+  host-cal fit --robot puma560 --rig triangles poses.csv --hold paper --json
+
+--hold takes a rule, parameter names, or both, separated by commas:
+  auto    hold what these poses cannot tell (the default)
+  paper   hold offset, z and alpha behind each joint, as the paper does
+  none    hold nothing; redundant parameters then share their changes
+  x1,...  hold just these, or these besides a rule: auto,scale3
+
+The file is written only when the fit reached a minimum and predicts poses left out of it better
+than the design does; otherwise the exit code is 1.")]
+pub(super) struct FitArgs {
+    #[command(flatten)]
+    measured: MeasuredArgs,
+    /// Parameters to leave at their design values: auto, paper, none, and names
+    #[arg(long, default_value = "auto", value_name = "RULE|NAME,…")]
+    hold: String,
+    /// What damps the steps: the identity as in the paper, or the diagonal of the normal matrix
+    #[arg(long, value_enum, default_value_t = DampingArg::Identity)]
+    damping: DampingArg,
+    /// Write the calibrated robot to this file
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum DampingArg {
+    Identity,
+    Diagonal,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+#[error("the robot file cannot be rewritten: {0}")]
+struct RewriteError(String);
+
+/// What `fit --json` prints.
+#[derive(Serialize)]
+pub(super) struct FitReport {
+    robot: String,
+    status: &'static str,
+    /// The test that a converged solve met.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    test: Option<&'static str>,
+    explanation: &'static str,
+    rank: usize,
+    parameters_total: usize,
+    independent_expected: usize,
+    free_parameters: usize,
+    iterations: usize,
+    poses: usize,
+    rms_initial_mm: f64,
+    rms_mm: f64,
+    rms_history_mm: Vec<f64>,
+    held_out: Option<HeldOut>,
+    /// Of the free columns, scaled; null when they are dependent.
+    condition: f64,
+    /// Estimated standard deviation of one length.
+    sigma_mm: Option<f64>,
+    solve_ms: f64,
+    /// Of residuals with the next ones measured; near 0 when they are independent.
+    neighbour_correlation: Option<f64>,
+    parameters: Vec<ParameterLine>,
+    not_identified: Vec<NotIdentified>,
+    by_pairing: Vec<PairingChange>,
+    /// Row numbers, from 1.
+    outliers: Vec<usize>,
+    outlier_details: Vec<OutlierLine>,
+    largest: Vec<ResidualLine>,
+    remarks: Vec<String>,
+    warnings: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    out: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    not_written_because: Option<String>,
+}
+
+#[derive(Serialize)]
+struct HeldOut {
+    folds: usize,
+    rms_mm: f64,
+}
+
+#[derive(Serialize)]
+struct ParameterLine {
+    name: String,
+    unit: &'static str,
+    initial: f64,
+    #[serde(rename = "final")]
+    fitted: f64,
+    change: f64,
+    std: Option<f64>,
+    held: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<String>,
+}
+
+#[derive(Serialize)]
+struct PairingChange {
+    initial_rms_mm: f64,
+    #[serde(flatten)]
+    fitted: PairingLine,
+}
+
+#[derive(Serialize)]
+struct OutlierLine {
+    row: usize,
+    place: String,
+    residual_mm: f64,
+    /// Robust standard deviations from the median.
+    score: f64,
+    /// `all` rows, or its `neighbours` in the order of measurement.
+    beside: &'static str,
+}
+
+impl FitArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        let hold: Hold = self.hold.parse()?;
+        let damping = match self.damping {
+            DampingArg::Identity => Damping::Identity,
+            DampingArg::Diagonal => Damping::Diagonal,
+        };
+        let measured = self.measured.read()?;
+        let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, damping })?;
+
+        let mut report = FitReport::new(&measured, &fit);
+        let reason = refusal(&fit);
+        if let Some(path) = &self.out {
+            match reason {
+                None => {
+                    write_atomically(path, &calibrated_toml(&measured.robot, &measured.dataset, &fit)?)?;
+                    report.out = Some(path.display().to_string());
+                }
+                Some(reason) => {
+                    warn(&format!("{} was not written: {reason}", path.display()));
+                    report.not_written_because = Some(reason.to_owned());
+                }
+            }
+        }
+        print(&report, self.output.json)?;
+        Ok(if reason.is_none() { Outcome::Good } else { Outcome::Doubtful })
+    }
+}
+
+/// Why a fit is not worth keeping; `None` when it is.
+fn refusal(fit: &Fit) -> Option<&'static str> {
+    if !fit.solution.status.is_minimum() {
+        return Some(fit.solution.status.explanation());
+    }
+    (!fit.is_improvement()).then_some("poses left out of the fit are predicted no better than by the design")
+}
+
+/// The robot's file with the fitted parameters and a `[calibration]` table.
+pub(super) fn calibrated_toml(robot: &Robot, dataset: &Dataset, fit: &Fit) -> Result<String, CommandError> {
+    let calibration = Calibration {
+        when: jiff::Timestamp::now().round(jiff::Unit::Second).unwrap_or_else(|_| jiff::Timestamp::now()).to_string(),
+        by: concat!("host-cal ", env!("CARGO_PKG_VERSION")).to_owned(),
+        from_robot: robot.source_name().to_owned(),
+        from_poses: dataset.files.clone(),
+        poses: dataset.rows.len(),
+        free_parameters: fit.free_parameters(),
+        rms_initial_mm: mm_from_m(fit.initial.rms_m),
+        rms_mm: mm_from_m(fit.fitted.rms_m),
+        held_out_rms_mm: fit.cross_validation.map(|held_out| mm_from_m(held_out.rms_m)),
+    };
+    let text = robot.calibrated_toml(&fit.solution.chain, &calibration);
+    text.map_err(|error| CommandError::output(RewriteError(error.to_string())))
+}
+
+impl FitReport {
+    pub(super) fn new(measured: &Measured, fit: &Fit) -> Self {
+        let Measured { robot, rig, dataset, warnings } = measured;
+        let test = match fit.solution.status {
+            Status::Converged(ConvergenceTest::Gradient) => Some("gradient"),
+            Status::Converged(ConvergenceTest::Cost) => Some("cost"),
+            Status::Converged(ConvergenceTest::Step) => Some("step"),
+            _ => None,
+        };
+        let outlier_details = outlier_lines(dataset, fit);
+        Self {
+            robot: robot.name.clone(),
+            status: fit.solution.status.name(),
+            test,
+            explanation: fit.solution.status.explanation(),
+            rank: fit.identifiability.spectrum.rank,
+            parameters_total: fit.parameters.len(),
+            independent_expected: robot.chain.independent_parameters(),
+            free_parameters: fit.free_parameters(),
+            iterations: fit.solution.iterations,
+            poses: dataset.rows.len(),
+            rms_initial_mm: mm_from_m(fit.initial.rms_m),
+            rms_mm: mm_from_m(fit.fitted.rms_m),
+            rms_history_mm: fit.solution.rms_history_m.iter().map(|&rms| mm_from_m(rms)).collect(),
+            held_out: fit.cross_validation.map(|proof| HeldOut { folds: proof.folds, rms_mm: mm_from_m(proof.rms_m) }),
+            condition: fit.uncertainty.spectrum.condition(),
+            sigma_mm: fit.uncertainty.sigma_m.map(mm_from_m),
+            solve_ms: fit.solve_time.as_secs_f64() * 1e3,
+            neighbour_correlation: fit.neighbour_correlation,
+            parameters: fit.parameters.iter().map(ParameterLine::new).collect(),
+            not_identified: NotIdentified::all(&fit.identifiability),
+            by_pairing: pairing_changes(rig, fit),
+            outliers: outlier_details.iter().map(|outlier| outlier.row).collect(),
+            outlier_details,
+            largest: largest(dataset, rig, &fit.residuals_m, 5),
+            remarks: remarks(&robot.chain, dataset, rig, &robot.limits).into_iter().chain(drift_remark(fit)).collect(),
+            warnings: warnings.clone(),
+            out: None,
+            not_written_because: None,
+        }
+    }
+}
+
+impl ParameterLine {
+    fn new(parameter: &FittedParameter) -> Self {
+        let unit = ScreenUnit::from(parameter.unit);
+        let (initial, fitted) = (unit.from_si(parameter.initial), unit.from_si(parameter.fitted));
+        Self {
+            name: parameter.parameter.to_string(),
+            unit: unit.name(),
+            initial,
+            fitted,
+            change: unit.from_si(parameter.fitted - parameter.initial),
+            std: parameter.std.map(|std| unit.from_si(std)),
+            held: parameter.held.is_some(),
+            why: parameter.held.clone(),
+        }
+    }
+
+    fn cells(&self) -> [String; 7] {
+        let digits = if self.unit == "mm" { 4 } else { 6 };
+        let number = |value: f64| format!("{value:.digits$}");
+        let (fitted, change) =
+            if self.held { (String::new(), String::new()) } else { (number(self.fitted), format!("{:+.digits$}", self.change)) };
+        let std = match (self.held, self.std) {
+            (true, _) => String::new(),
+            (false, Some(std)) => number(std),
+            (false, None) => "undetermined".to_owned(),
+        };
+        let held = self.why.as_ref().map(|why| format!("held: {why}")).unwrap_or_default();
+        [self.name.clone(), self.unit.to_owned(), number(self.initial), fitted, change, std, held]
+    }
+}
+
+/// What residuals that follow one another mean for the result.
+fn drift_remark(fit: &Fit) -> Option<String> {
+    const ALIKE: f64 = 0.5;
+    let correlation = fit.neighbour_correlation.filter(|&correlation| correlation > ALIKE)?;
+    Some(format!(
+        "Residuals follow one another in the order of measurement (correlation {correlation:.2}): something drifts or jumps that the model \
+         does not hold, such as the zero of the bar. Deviations below are too small then."
+    ))
+}
+
+fn pairing_changes(rig: &Rig, fit: &Fit) -> Vec<PairingChange> {
+    let pairs = fit.initial_by_pairing.iter().zip(&fit.fitted_by_pairing);
+    let change = |(initial, fitted): (&crate::identify::PairingResiduals, _)| PairingChange {
+        initial_rms_mm: mm_from_m(initial.summary.rms_m),
+        fitted: PairingLine::new(rig, fitted),
+    };
+    pairs.map(change).collect()
+}
+
+fn outlier_lines(dataset: &Dataset, fit: &Fit) -> Vec<OutlierLine> {
+    let line = |outlier: &crate::identify::Outlier| OutlierLine {
+        row: outlier.row + 1,
+        place: dataset.place(outlier.row),
+        residual_mm: mm_from_m(fit.residuals_m[outlier.row]),
+        score: outlier.score,
+        beside: match outlier.test {
+            OutlierTest::All => "all",
+            OutlierTest::Neighbours => "neighbours",
+        },
+    };
+    fit.outliers.iter().map(line).collect()
+}
+
+impl Report for FitReport {
+    fn text(&self) -> String {
+        let mut text = self.headline();
+        for remark in &self.remarks {
+            text += &format!("\n{remark}\n");
+        }
+        text += "\n";
+        let mut table = Columns::new(&["<parameter", "<unit", "initial", "final", "change", "std. dev.", "<"]);
+        for parameter in &self.parameters {
+            table.row(parameter.cells());
+        }
+        text += &table.text();
+        text += "\nby pairing\n";
+        text += &self.pairings_text();
+        text += "\nlargest residuals (measured less computed)\n";
+        text += &largest_text(&self.largest);
+        text += &self.outliers_text();
+        if let Some(out) = &self.out {
+            text += &format!("\nwrote {out}\n");
+        }
+        text
+    }
+}
+
+impl FitReport {
+    fn headline(&self) -> String {
+        let status = self.status.replace('_', " ");
+        let mut text = format!("{}, {} poses\n\n", self.robot, self.poses);
+        text += &format!("{status} after {} steps: {}\n", self.iterations, self.explanation);
+        text += &format!(
+            "{} of {} parameters free; rank {}, at most {} can be independent; condition {}\n",
+            self.free_parameters,
+            self.parameters_total,
+            self.rank,
+            self.independent_expected,
+            if self.condition.is_finite() {
+                format!("{:.0}", self.condition)
+            } else {
+                "infinite (dependent parameters are free)".to_owned()
+            }
+        );
+        text += &format!("RMS {:.4} mm before, {:.4} mm after", self.rms_initial_mm, self.rms_mm);
+        if let Some(held_out) = &self.held_out {
+            text += &format!("; {:.4} mm on poses left out ({} folds)", held_out.rms_mm, held_out.folds);
+        }
+        text + "\n"
+    }
+
+    fn pairings_text(&self) -> String {
+        let mut table = Columns::new(&["<pairing", "poses", "RMS before mm", "RMS after mm", "mean mm", "largest mm"]);
+        for line in &self.by_pairing {
+            let fitted = &line.fitted;
+            let numbers = [line.initial_rms_mm, fitted.rms_mm, fitted.mean_mm, fitted.max_abs_mm].map(|mm| format!("{mm:.4}"));
+            table.row([fitted.pairing.clone(), fitted.poses.to_string()].into_iter().chain(numbers));
+        }
+        table.text()
+    }
+
+    fn outliers_text(&self) -> String {
+        if self.outlier_details.is_empty() {
+            return "\nno outliers\n".to_owned();
+        }
+        let mut table = Columns::new(&["row", "<at", "residual mm", "score", "<stands out from"]);
+        for outlier in &self.outlier_details {
+            let beside = if outlier.beside == "all" { "all rows" } else { "the rows measured around it" };
+            table.row([
+                outlier.row.to_string(),
+                outlier.place.clone(),
+                format!("{:.4}", outlier.residual_mm),
+                format!("{:+.1}", outlier.score),
+                beside.to_owned(),
+            ]);
+        }
+        format!("\noutliers: look at these rows, measure them again or leave them out\n{}", table.text())
+    }
+}

@@ -1,0 +1,136 @@
+//! Arguments that several commands share, and reading what they name.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use miette::Diagnostic;
+use thiserror::Error;
+
+use super::outcome::CommandError;
+use super::report::warn;
+use crate::files::{Dataset, PairingId, Rig, Robot, RowWarning};
+
+/// `--json`.
+#[derive(Args)]
+pub(super) struct OutputArgs {
+    /// Print one JSON document instead of text
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// A robot, a rig and files of poses.
+#[derive(Args)]
+pub(super) struct MeasuredArgs {
+    /// robot.toml, or a built-in: puma560, puma560-optimised, irb120, ur5e, stanford, scara
+    #[arg(long)]
+    robot: String,
+    /// rig.toml, or the built-in: triangles
+    #[arg(long)]
+    rig: String,
+    /// Files of measured poses (poses.csv)
+    #[arg(required = true)]
+    poses: Vec<PathBuf>,
+}
+
+/// What the arguments named.
+pub(super) struct Measured {
+    pub(super) robot: Robot,
+    pub(super) rig: Rig,
+    pub(super) dataset: Dataset,
+    /// Rows that may be mistakes, in words.
+    pub(super) warnings: Vec<String>,
+}
+
+impl MeasuredArgs {
+    /// Reads the files and says on stderr what may be wrong with them.
+    pub(super) fn read(&self) -> Result<Measured, CommandError> {
+        let robot = Robot::open(&self.robot)?;
+        let rig = Rig::open(&self.rig)?;
+        let dataset = Dataset::read(self.poses.iter().map(PathBuf::as_path), &robot, &rig)?;
+        let warnings = summarise(&dataset, &dataset.warnings(&robot, &rig));
+        for warning in &warnings {
+            warn(warning);
+        }
+        Ok(Measured { robot, rig, dataset, warnings })
+    }
+}
+
+/// One sentence for each kind of warning, with the first rows that it concerns.
+fn summarise(dataset: &Dataset, warnings: &[(usize, RowWarning)]) -> Vec<String> {
+    const SHOWN: usize = 5;
+    let mut kinds: Vec<(String, Vec<usize>)> = Vec::new();
+    for (row, warning) in warnings {
+        let text = match warning {
+            RowWarning::Repeated { .. } => "repeat an earlier row".to_owned(),
+            RowWarning::BeyondTravel => "have a length beyond the bar's travel".to_owned(),
+            RowWarning::BeyondLimits { joint } => format!("have joint {joint} beyond its limits"),
+        };
+        match kinds.iter_mut().find(|(kind, _)| *kind == text) {
+            Some((_, rows)) => rows.push(*row),
+            None => kinds.push((text, vec![*row])),
+        }
+    }
+    let sentence = |(text, rows): &(String, Vec<usize>)| {
+        let places: Vec<String> = rows.iter().take(SHOWN).map(|&row| dataset.place(row)).collect();
+        let more = if rows.len() > SHOWN { format!(" and {} more", rows.len() - SHOWN) } else { String::new() };
+        format!("{} of {} poses {text}: {}{more}", rows.len(), dataset.rows.len(), places.join(", "))
+    };
+    kinds.iter().map(sentence).collect()
+}
+
+/// Why a list on the command line cannot be used.
+#[derive(Debug, Error, Diagnostic)]
+pub(super) enum ListError {
+    /// A pairing that is not `chuck:sphere` of this rig.
+    #[error("`{0}` is no pairing of this rig, expected chuck:sphere as in A:1,B:2")]
+    #[diagnostic(help("The rig has chucks {1} and spheres {2}."))]
+    Pairing(String, String, String),
+    /// The same pairing twice.
+    #[error("pairing `{0}` stands there twice")]
+    RepeatedPairing(String),
+    /// No pose has one of these pairings.
+    #[error("no pose has one of the pairings {0}")]
+    NoPoseLeft(String),
+    /// No bar length to simulate.
+    #[error("the rig names no bar length")]
+    #[diagnostic(help("Give one, in millimetres: --bar 460"))]
+    NoBar,
+    /// A number that has to be above zero, or not below.
+    #[error("{flag} is {found}, expected {expected}")]
+    Number {
+        /// The flag.
+        flag: &'static str,
+        /// What was given.
+        found: String,
+        /// What may be given.
+        expected: &'static str,
+    },
+    /// `--q` with more or fewer values than joints.
+    #[error("--q has {found} values, but the robot has {expected} joints")]
+    #[diagnostic(help("Give one value a joint, in degrees, or millimetres for a prismatic joint: --q 10,20,…"))]
+    JointValues {
+        /// Values given.
+        found: usize,
+        /// Joints of the robot.
+        expected: usize,
+    },
+}
+
+/// Reads `A:1,B:2`.
+pub(super) fn parse_pairings(text: &str, rig: &Rig) -> Result<Vec<PairingId>, CommandError> {
+    let mut pairings = Vec::new();
+    for word in text.split(',').map(str::trim) {
+        let ends = word.split_once(':').and_then(|(chuck, sphere)| Some((rig.chuck(chuck)?, rig.sphere(sphere)?)));
+        let Some((chuck, sphere)) = ends else {
+            let names =
+                |points: &[crate::files::NamedPoint]| points.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(CommandError::usage(ListError::Pairing(word.to_owned(), names(&rig.chucks), names(&rig.spheres))));
+        };
+        let pairing = PairingId { chuck, sphere };
+        if pairings.contains(&pairing) {
+            return Err(CommandError::usage(ListError::RepeatedPairing(word.to_owned())));
+        }
+        pairings.push(pairing);
+    }
+    Ok(pairings)
+}

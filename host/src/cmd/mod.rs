@@ -1,0 +1,63 @@
+//! The `host-cal` command: one file a subcommand.
+//!
+//! Every command reads its inputs whole, computes a report and prints it: as text for people, or as the one JSON document of
+//! `--json`. Progress and warnings go to stderr.
+
+mod demo;
+mod fit;
+mod fk;
+mod inputs;
+mod outcome;
+mod paper;
+mod rank;
+mod report;
+mod simulate;
+mod table;
+mod validate;
+
+use clap::{Parser, Subcommand};
+
+pub use outcome::{CommandError, Outcome};
+pub use report::show_error;
+
+/// Calibrate a robot's kinematics with a ball-bar: from one length at a time to every parameter that lengths can tell.
+#[derive(Parser)]
+#[command(
+    name = "host-cal",
+    version,
+    max_term_width = 100,
+    after_help = "Exit codes: 0 done; 1 done, but the result is not to be trusted as it is; 2 bad input or usage, nothing written; 3 a file could not be written."
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Fit(fit::FitArgs),
+    Validate(validate::ValidateArgs),
+    Rank(rank::RankArgs),
+    Fk(fk::FkArgs),
+    Simulate(simulate::SimulateArgs),
+    Paper(paper::PaperArgs),
+    Demo(demo::DemoArgs),
+}
+
+impl Cli {
+    /// Runs the subcommand.
+    ///
+    /// # Errors
+    /// [`CommandError`] with the message to show and the exit code.
+    pub fn run(&self) -> Result<Outcome, CommandError> {
+        match &self.command {
+            Command::Fit(args) => args.run(),
+            Command::Validate(args) => args.run(),
+            Command::Rank(args) => args.run(),
+            Command::Fk(args) => args.run(),
+            Command::Simulate(args) => args.run(),
+            Command::Paper(args) => args.run(),
+            Command::Demo(args) => args.run(),
+        }
+    }
+}

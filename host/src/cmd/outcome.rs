@@ -1,0 +1,78 @@
+//! How a command ends.
+
+use std::process::ExitCode;
+
+use miette::{Diagnostic, Report};
+
+use crate::files::{InputError, WriteError};
+use crate::identify::{FitError, HoldError};
+use crate::simulate::ShellError;
+
+/// How a command that ran to its end ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Exit code 0.
+    Good,
+    /// The report was printed, but its result is not to be trusted as it is: exit code 1.
+    Doubtful,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Good => Self::SUCCESS,
+            Outcome::Doubtful => Self::from(1),
+        }
+    }
+}
+
+/// Why a command did not run to its end.
+#[derive(Debug)]
+pub struct CommandError {
+    /// What to show.
+    pub report: Report,
+    /// 2 for bad input or usage, 3 for output that could not be written.
+    pub exit_code: u8,
+}
+
+impl CommandError {
+    /// Bad input or usage.
+    pub(super) fn usage(diagnostic: impl Diagnostic + Send + Sync + 'static) -> Self {
+        Self { report: Report::new(diagnostic), exit_code: 2 }
+    }
+
+    /// Output that could not be written.
+    pub(super) fn output(diagnostic: impl Diagnostic + Send + Sync + 'static) -> Self {
+        Self { report: Report::new(diagnostic), exit_code: 3 }
+    }
+}
+
+impl From<InputError> for CommandError {
+    fn from(error: InputError) -> Self {
+        Self::usage(error)
+    }
+}
+
+impl From<FitError> for CommandError {
+    fn from(error: FitError) -> Self {
+        Self::usage(error)
+    }
+}
+
+impl From<HoldError> for CommandError {
+    fn from(error: HoldError) -> Self {
+        Self::usage(error)
+    }
+}
+
+impl From<ShellError> for CommandError {
+    fn from(error: ShellError) -> Self {
+        Self::usage(error)
+    }
+}
+
+impl From<WriteError> for CommandError {
+    fn from(error: WriteError) -> Self {
+        Self::output(error)
+    }
+}

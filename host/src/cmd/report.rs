@@ -1,0 +1,56 @@
+//! What a command found, for people and for machines, from one place.
+
+use std::io::{IsTerminal, Write, stderr, stdout};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{Diagnostic, Report as MietteReport};
+use serde::Serialize;
+use thiserror::Error;
+
+use super::outcome::CommandError;
+
+/// A result that can be shown as text and as JSON.
+pub(super) trait Report: Serialize {
+    /// For people, ended by a newline.
+    fn text(&self) -> String;
+}
+
+#[derive(Debug, Error, Diagnostic)]
+#[error("the result cannot be printed: {0}")]
+struct PrintError(String);
+
+/// Prints a report to stdout: one JSON document, or text.
+pub(super) fn print(report: &impl Report, json: bool) -> Result<(), CommandError> {
+    let text = if json {
+        let document =
+            serde_json::to_string_pretty(report).map_err(|error| CommandError::output(PrintError(error.to_string())))?;
+        document + "\n"
+    } else {
+        report.text()
+    };
+    match stdout().write_all(text.as_bytes()).and_then(|()| stdout().flush()) {
+        // A reader that has seen enough, like `head`, is no failure.
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(CommandError::output(PrintError(error.to_string()))),
+        _ => Ok(()),
+    }
+}
+
+/// Says something that is no result and no error.
+pub(super) fn warn(message: &str) {
+    let _ = writeln!(stderr(), "warning: {message}");
+}
+
+/// A progress bar on stderr, drawn only where that is a terminal.
+pub(super) fn progress(steps: u64, what: &'static str) -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style =
+        ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {eta:>4}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(steps).with_style(style).with_message(what)
+}
+
+/// Shows an error on stderr.
+pub fn show_error(report: &MietteReport) {
+    let _ = writeln!(stderr(), "{report:?}");
+}

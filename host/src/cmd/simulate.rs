@@ -1,0 +1,188 @@
+//! `host-cal simulate`: lengths that a robot would give on hemispherical shells.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::inputs::{ListError, OutputArgs, parse_pairings};
+use super::outcome::{CommandError, Outcome};
+use super::report::{Report, print, progress};
+use crate::files::{PairingId, PoseRow, Rig, Robot, write_atomically, write_poses};
+use crate::simulate::{ShellPose, Shells};
+use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
+
+/// Simulate lengths on the hemispherical shells of the chosen pairings
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-cal simulate --robot puma560-optimised --plan-robot puma560 --rig triangles --bar 460 \\
+           --per-pair 90 --sigma-mm 0.084 --seed 7 --out poses.csv
+  host-cal simulate --robot ur5e --rig triangles --bar 460,610 --pairings A:1,B:2,C:3
+
+Poses keep the robot's joint limits and the bar's travel. Without --out they go to stdout.")]
+pub(super) struct SimulateArgs {
+    /// The true robot: robot.toml, or a built-in
+    #[arg(long)]
+    robot: String,
+    /// The robot that the poses are planned with, when its controller believes other parameters
+    #[arg(long)]
+    plan_robot: Option<String>,
+    /// rig.toml, or the built-in: triangles
+    #[arg(long)]
+    rig: String,
+    /// Bar lengths at mid travel, millimetres; the rig's when not given
+    #[arg(long, value_delimiter = ',', value_name = "MM,…")]
+    bar: Vec<f64>,
+    /// Pairings, chuck:sphere separated by commas; all when not given
+    #[arg(long, value_name = "A:1,B:2,…")]
+    pairings: Option<String>,
+    /// Poses on each pairing's shell
+    #[arg(long, default_value_t = 90)]
+    per_pair: usize,
+    /// Standard deviation of the lengths' noise, millimetres
+    #[arg(long, default_value_t = 0.0, value_name = "MM")]
+    sigma_mm: f64,
+    /// The same seed gives the same file on every machine
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Write the poses to this file
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Serialize)]
+struct SimulateReport {
+    robot: String,
+    planned_with: String,
+    bar_mm: Vec<f64>,
+    pairings: Vec<String>,
+    per_pairing: usize,
+    sigma_mm: f64,
+    seed: u64,
+    poses: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    out: Option<String>,
+    /// The poses themselves, unless they went to a file.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    rows: Vec<RowLine>,
+    #[serde(skip)]
+    csv: String,
+}
+
+#[derive(Serialize)]
+struct RowLine {
+    chuck: String,
+    sphere: String,
+    /// Degrees, or millimetres for a prismatic joint.
+    q: Vec<f64>,
+    length_mm: f64,
+    bar_mm: String,
+    latitude_deg: f64,
+    longitude_deg: f64,
+}
+
+impl SimulateArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        let truth = Robot::open(&self.robot)?;
+        let planned_with = self.plan_robot.as_deref().map_or_else(|| Ok(truth.clone()), Robot::open)?;
+        let rig = Rig::open(&self.rig)?;
+        let report = self.simulate(&truth, &planned_with, &rig)?;
+        if let Some(path) = &self.out {
+            write_atomically(path, &report.csv)?;
+        }
+        print(&report, self.output.json)?;
+        Ok(Outcome::Good)
+    }
+
+    fn simulate(&self, truth: &Robot, planned_with: &Robot, rig: &Rig) -> Result<SimulateReport, CommandError> {
+        let pairings = self.pairings.as_ref().map_or_else(|| Ok(rig.all_pairings()), |list| parse_pairings(list, rig))?;
+        let bar_mm = self.bar_mm(rig)?;
+        self.check(truth, planned_with)?;
+
+        let bar = progress((bar_mm.len() * pairings.len() * self.per_pair) as u64, "simulating poses");
+        let mut poses = Vec::new();
+        for (i, &bar_mm) in bar_mm.iter().enumerate() {
+            let shells = Shells {
+                planned_with,
+                truth,
+                rig,
+                pairings: &pairings,
+                bar_m: m_from_mm(bar_mm),
+                per_pairing: self.per_pair,
+                sigma_m: m_from_mm(self.sigma_mm),
+                seed: self.seed.wrapping_add(i as u64),
+            };
+            poses.extend(shells.simulate(|| bar.inc(1))?);
+        }
+        bar.finish_and_clear();
+        let rows: Vec<PoseRow> = poses.iter().map(|pose| pose.row.clone()).collect();
+        Ok(SimulateReport {
+            robot: truth.name.clone(),
+            planned_with: planned_with.name.clone(),
+            bar_mm,
+            pairings: pairings.iter().map(|&pairing: &PairingId| rig.pairing_name(pairing)).collect(),
+            per_pairing: self.per_pair,
+            sigma_mm: self.sigma_mm,
+            seed: self.seed,
+            poses: poses.len(),
+            out: self.out.as_ref().map(|path| path.display().to_string()),
+            rows: if self.out.is_some() { Vec::new() } else { poses.iter().map(|pose| row_line(pose, truth, rig)).collect() },
+            csv: write_poses(truth, rig, &rows),
+        })
+    }
+
+    fn bar_mm(&self, rig: &Rig) -> Result<Vec<f64>, CommandError> {
+        if !self.bar.is_empty() {
+            return Ok(self.bar.clone());
+        }
+        let bar = rig.bar.as_ref().ok_or_else(|| CommandError::usage(ListError::NoBar))?;
+        Ok(bar.lengths_m.iter().map(|&m| mm_from_m(m)).collect())
+    }
+
+    fn check(&self, truth: &Robot, planned_with: &Robot) -> Result<(), CommandError> {
+        let refuse = |flag, found: String, expected| Err(CommandError::usage(ListError::Number { flag, found, expected }));
+        if let Some(bar) = self.bar.iter().find(|&&mm| !(mm.is_finite() && mm > 0.0)) {
+            return refuse("--bar", bar.to_string(), "a number above zero");
+        }
+        if !(self.sigma_mm.is_finite() && self.sigma_mm >= 0.0) {
+            return refuse("--sigma-mm", self.sigma_mm.to_string(), "zero or a number above it");
+        }
+        if self.per_pair == 0 {
+            return refuse("--per-pair", "0".to_owned(), "at least 1");
+        }
+        if truth.chain.joint_kinds() != planned_with.chain.joint_kinds() {
+            return refuse("--plan-robot", planned_with.name.clone(), "a robot with the same joints as --robot");
+        }
+        Ok(())
+    }
+}
+
+fn row_line(pose: &ShellPose, robot: &Robot, rig: &Rig) -> RowLine {
+    let row = &pose.row;
+    let q = robot.chain.joint_kinds().iter().zip(row.measurement.q.as_array());
+    RowLine {
+        chuck: rig.chucks[row.pairing.chuck].name.clone(),
+        sphere: rig.spheres[row.pairing.sphere].name.clone(),
+        q: q.map(|(&kind, &q)| ScreenUnit::from(kind).from_si(q)).collect(),
+        length_mm: mm_from_m(row.measurement.length_m),
+        bar_mm: row.set.clone().unwrap_or_default(),
+        latitude_deg: pose.latitude_rad.to_degrees(),
+        longitude_deg: pose.longitude_rad.to_degrees(),
+    }
+}
+
+impl Report for SimulateReport {
+    fn text(&self) -> String {
+        match &self.out {
+            Some(out) => format!(
+                "{} poses of {} on {} shells, to {out}\n",
+                self.poses,
+                self.robot,
+                self.pairings.len() * self.bar_mm.len()
+            ),
+            None => self.csv.clone(),
+        }
+    }
+}

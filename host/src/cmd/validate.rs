@@ -1,0 +1,150 @@
+//! `host-cal validate`: residuals of poses that a fit has not seen.
+
+use clap::Args;
+use serde::Serialize;
+
+use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs};
+use super::outcome::{CommandError, Outcome};
+use super::report::{Report, print};
+use super::table::Columns;
+use crate::files::{Dataset, Rig};
+use crate::identify::{PairingResiduals, ResidualSummary, by_pairing, residuals_m};
+use crate::units::mm_from_m;
+
+/// Residuals on poses that the fit has not seen
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  host-cal validate --robot calibrated.toml --rig rig.toml poses-610.csv\n\nWith --max-rms-mm, exit code 1 says that the residuals are larger."
+)]
+pub(super) struct ValidateArgs {
+    #[command(flatten)]
+    measured: MeasuredArgs,
+    /// End with exit code 1 when the RMS residual is above this
+    #[arg(long, value_name = "MM")]
+    max_rms_mm: Option<f64>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Serialize)]
+struct ValidateReport {
+    robot: String,
+    calibrated: bool,
+    poses: usize,
+    rms_mm: f64,
+    max_abs_mm: f64,
+    mean_mm: f64,
+    by_pairing: Vec<PairingLine>,
+    largest: Vec<ResidualLine>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    within_max_rms: Option<bool>,
+    warnings: Vec<String>,
+}
+
+/// Residuals of one pairing, for tables and JSON.
+#[derive(Serialize)]
+pub(super) struct PairingLine {
+    pub(super) pairing: String,
+    pub(super) poses: usize,
+    pub(super) rms_mm: f64,
+    pub(super) mean_mm: f64,
+    pub(super) max_abs_mm: f64,
+}
+
+impl PairingLine {
+    pub(super) fn new(rig: &Rig, residuals: &PairingResiduals) -> Self {
+        let PairingResiduals { pairing, summary } = residuals;
+        Self {
+            pairing: rig.pairing_name(*pairing),
+            poses: summary.count,
+            rms_mm: mm_from_m(summary.rms_m),
+            mean_mm: mm_from_m(summary.mean_m),
+            max_abs_mm: mm_from_m(summary.max_abs_m),
+        }
+    }
+}
+
+/// One row's residual.
+#[derive(Serialize)]
+pub(super) struct ResidualLine {
+    /// From 1, over all files.
+    pub(super) row: usize,
+    /// File and line.
+    pub(super) place: String,
+    pub(super) pairing: String,
+    pub(super) residual_mm: f64,
+}
+
+/// The rows with the largest residuals, the worst first.
+pub(super) fn largest(dataset: &Dataset, rig: &Rig, residuals_m: &[f64], count: usize) -> Vec<ResidualLine> {
+    let mut order: Vec<usize> = (0..residuals_m.len()).collect();
+    order.sort_by(|&a, &b| residuals_m[b].abs().total_cmp(&residuals_m[a].abs()));
+    let line = |&row: &usize| ResidualLine {
+        row: row + 1,
+        place: dataset.place(row),
+        pairing: rig.pairing_name(dataset.rows[row].pairing),
+        residual_mm: mm_from_m(residuals_m[row]),
+    };
+    order.iter().take(count).map(line).collect()
+}
+
+/// A table of the largest residuals.
+pub(super) fn largest_text(lines: &[ResidualLine]) -> String {
+    let mut table = Columns::new(&["row", "<at", "<pairing", "residual mm"]);
+    for line in lines {
+        table.row([line.row.to_string(), line.place.clone(), line.pairing.clone(), format!("{:.4}", line.residual_mm)]);
+    }
+    table.text()
+}
+
+impl ValidateArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        if let Some(limit) = self.max_rms_mm.filter(|limit| !(*limit > 0.0)) {
+            let found = limit.to_string();
+            return Err(CommandError::usage(ListError::Number { flag: "--max-rms-mm", found, expected: "a number above zero" }));
+        }
+        let measured = self.measured.read()?;
+        let report = self.report(measured);
+        print(&report, self.output.json)?;
+        Ok(if report.within_max_rms == Some(false) { Outcome::Doubtful } else { Outcome::Good })
+    }
+
+    fn report(&self, measured: Measured) -> ValidateReport {
+        let Measured { robot, rig, dataset, warnings } = measured;
+        let residuals_m = residuals_m(&robot.chain, &dataset);
+        let summary = ResidualSummary::new(&residuals_m);
+        let rms_mm = mm_from_m(summary.rms_m);
+        ValidateReport {
+            calibrated: robot.calibration.is_some(),
+            robot: robot.name,
+            poses: summary.count,
+            rms_mm,
+            max_abs_mm: mm_from_m(summary.max_abs_m),
+            mean_mm: mm_from_m(summary.mean_m),
+            by_pairing: by_pairing(&dataset, &residuals_m).iter().map(|one| PairingLine::new(&rig, one)).collect(),
+            largest: largest(&dataset, &rig, &residuals_m, 5),
+            within_max_rms: self.max_rms_mm.map(|limit| rms_mm <= limit),
+            warnings,
+        }
+    }
+}
+
+impl Report for ValidateReport {
+    fn text(&self) -> String {
+        let calibrated = if self.calibrated { "calibrated" } else { "not calibrated" };
+        let mut text = format!("{} ({calibrated}), {} poses\n\n", self.robot, self.poses);
+        text += &format!("RMS {:.4} mm, mean {:.4} mm, largest {:.4} mm\n\n", self.rms_mm, self.mean_mm, self.max_abs_mm);
+        let mut table = Columns::new(&["<pairing", "poses", "RMS mm", "mean mm", "largest mm"]);
+        for line in &self.by_pairing {
+            let numbers = [line.rms_mm, line.mean_mm, line.max_abs_mm].map(|mm| format!("{mm:.4}"));
+            table.row([line.pairing.clone(), line.poses.to_string()].into_iter().chain(numbers));
+        }
+        text += &table.text();
+        text += "\nlargest residuals (measured less computed)\n";
+        text += &largest_text(&self.largest);
+        if let Some(within) = self.within_max_rms {
+            text += if within { "\nThe RMS is within the limit.\n" } else { "\nThe RMS is ABOVE the limit.\n" };
+        }
+        text
+    }
+}

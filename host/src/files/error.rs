@@ -1,0 +1,235 @@
+//! What can be wrong with an input file, and what to do about it.
+
+use std::ops::Range;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use thiserror::Error;
+
+use super::source::Source;
+
+/// What is wrong. Each variant knows what was found and what was expected.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// The file cannot be opened, or is not UTF-8 text.
+    #[error("cannot be read: {0}")]
+    Unreadable(String),
+    /// Neither a file nor a built-in has this name.
+    #[error("no such file, and no built-in {what} of this name")]
+    NoSuchFile {
+        /// `robot` or `rig`.
+        what: &'static str,
+        /// The names that are built in.
+        builtins: String,
+    },
+    /// Not TOML, an unknown or missing key, or a value of the wrong type; in the parser's words.
+    #[error("{0}")]
+    Toml(String),
+    /// A robot needs 1 to 8 joints.
+    #[error("{found} joints, expected 1 to 8")]
+    JointCount {
+        /// Joints in the file.
+        found: usize,
+    },
+    /// J joints need J + 1 links.
+    #[error("{found} links, expected {expected}: one more than the {joints} joints")]
+    LinkCount {
+        /// Links in the file.
+        found: usize,
+        /// Links that the joints need.
+        expected: usize,
+        /// Joints in the file.
+        joints: usize,
+    },
+    /// A key whose unit belongs to the other kind of joint.
+    #[error("`{key}` on a {kind} joint, expected `{expected}`")]
+    JointUnit {
+        /// The key found.
+        key: &'static str,
+        /// `revolute` or `prismatic`.
+        kind: &'static str,
+        /// The key with the fitting unit.
+        expected: String,
+    },
+    /// A joint without one of its keys.
+    #[error("joint {joint} has no `{key}`")]
+    JointKeyMissing {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// The key that it needs.
+        key: String,
+    },
+    /// A number that is infinite, not a number, or out of its range.
+    #[error("`{field}` is {found}, expected {expected}")]
+    Number {
+        /// Key or column.
+        field: String,
+        /// What stands there.
+        found: String,
+        /// What may stand there.
+        expected: &'static str,
+    },
+    /// The lower limit is not below the upper one.
+    #[error("joint {joint}: the lower limit {min} is not below the upper limit {max}")]
+    Limits {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Lower limit as in the file.
+        min: f64,
+        /// Upper limit as in the file.
+        max: f64,
+    },
+    /// Coupling to a joint that does not exist or is the joint itself.
+    #[error("joint {joint} is coupled to joint {to}, expected another of the {joints} joints")]
+    Coupling {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// The joint it is coupled to.
+        to: usize,
+        /// Joints of the robot.
+        joints: usize,
+    },
+    /// No chuck or no sphere in a rig.
+    #[error("no {0}, expected at least one")]
+    Empty(&'static str),
+    /// Two chucks, spheres, columns of one name.
+    #[error("{what} `{name}` stands there twice")]
+    Duplicate {
+        /// `chuck`, `sphere` or `column`.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A chuck's or sphere's name that a pairing `A:1,B:2` or a CSV field cannot hold.
+    #[error("the name `{0}` is empty or holds a comma, colon, quote, `#` or white space at its ends")]
+    Name(String),
+    /// The poses' header lacks a column.
+    #[error("the column `{0}` is missing")]
+    MissingColumn(String),
+    /// The poses' header has a column that no robot file asks for.
+    #[error("unknown column `{0}`")]
+    UnknownColumn(String),
+    /// A joint's column has the unit of the other kind of joint.
+    #[error("column `{found}`, but joint {joint} is {kind}: expected `{expected}`")]
+    ColumnUnit {
+        /// The column found.
+        found: String,
+        /// The column with the fitting unit.
+        expected: String,
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// `revolute` or `prismatic`.
+        kind: &'static str,
+    },
+    /// The header has more or fewer joint columns than the robot has joints.
+    #[error("{found} joint columns, but the robot has {expected} joints")]
+    JointColumns {
+        /// Joint columns in the header.
+        found: usize,
+        /// Joints of the robot.
+        expected: usize,
+    },
+    /// A row with more or fewer fields than the header.
+    #[error("{found} fields, expected {expected} as in the header")]
+    FieldCount {
+        /// Fields in the row.
+        found: usize,
+        /// Fields in the header.
+        expected: usize,
+    },
+    /// A field that is no number at all.
+    #[error("column `{column}`: `{found}` is not a number")]
+    NotANumber {
+        /// The column.
+        column: String,
+        /// What stands there.
+        found: String,
+    },
+    /// A chuck or sphere that the rig does not have.
+    #[error("unknown {what} `{found}`, the rig has {known}")]
+    UnknownEnd {
+        /// `chuck` or `sphere`.
+        what: &'static str,
+        /// What stands there.
+        found: String,
+        /// The rig's names.
+        known: String,
+    },
+    /// A header and nothing else.
+    #[error("no poses")]
+    NoPoses,
+    /// CSV that cannot be split into records.
+    #[error("not CSV: {0}")]
+    Csv(String),
+    /// `sigma_mm` in one file of poses and not in another.
+    #[error("`sigma_mm` is given for some poses and not for others")]
+    MixedSigma,
+}
+
+impl Problem {
+    fn help(&self) -> Option<String> {
+        let help = match self {
+            Self::NoSuchFile { what, builtins } => return Some(format!("Give a path, or a built-in {what}: {builtins}.")),
+            Self::Unreadable(_) | Self::Csv(_) | Self::FieldCount { .. } => return None,
+            Self::Toml(_) => "The keys and their units are in docs/files.md.",
+            Self::JointCount { .. } | Self::LinkCount { .. } => "A chain is link 1, joint 1, link 2, … joint J, link J+1.",
+            Self::JointUnit { .. } | Self::ColumnUnit { .. } => "Angles are in degrees (`_deg`), slides in millimetres (`_mm`).",
+            Self::JointKeyMissing { .. } => "A joint needs type, offset, scale and both limits.",
+            Self::Number { .. } | Self::NotANumber { .. } => "Write a plain decimal number with a point.",
+            Self::Limits { .. } => "Limits are those of the encoder output q.",
+            Self::Coupling { .. } => "`coupling = { joint = 5, ratio = 0.18 }` on joint 6: it turns by 0.18 of joint 5's turn.",
+            Self::Empty(_) => "A rig needs chucks and spheres.",
+            Self::Duplicate { .. } | Self::Name(_) => "Names are how poses and pairings refer to chucks, spheres and columns.",
+            Self::MissingColumn(_) | Self::UnknownColumn(_) | Self::JointColumns { .. } => {
+                "Expected: chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); optional: sigma_mm, set, t_s."
+            }
+            Self::UnknownEnd { .. } => "Names are compared letter by letter; is this the rig that was measured with?",
+            Self::NoPoses => "Was the recording stopped before the first pose settled?",
+            Self::MixedSigma => "Weights compare poses with one another: give `sigma_mm` for every pose, or for none.",
+        };
+        Some(help.to_owned())
+    }
+}
+
+/// A [`Problem`] and where it is.
+#[derive(Debug, Error)]
+#[error("{}: {problem}", .place)]
+pub struct InputError {
+    place: String,
+    problem: Problem,
+    at: Option<(NamedSource<String>, Range<usize>)>,
+}
+
+impl InputError {
+    /// A problem of a whole file.
+    pub(crate) fn of_file(name: &str, problem: Problem) -> Self {
+        Self { place: name.to_owned(), problem, at: None }
+    }
+
+    /// A problem at some bytes of a text.
+    pub(crate) fn at(source: &Source, span: Range<usize>, problem: Problem) -> Self {
+        let place = format!("{}:{}", source.name(), source.line_of(span.start));
+        let named = NamedSource::new(source.name(), source.text().to_owned());
+        Self { place, problem, at: Some((named, span)) }
+    }
+
+    /// What is wrong.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+}
+
+impl Diagnostic for InputError {
+    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
+        self.problem.help().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.at.as_ref().map(|(source, _)| source as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let (_, span) = self.at.as_ref()?;
+        Some(Box::new(std::iter::once(LabeledSpan::underline(span.clone()))))
+    }
+}

@@ -1,0 +1,20 @@
+//! Robots, rigs and measured poses: the project's files (see `docs/files.md`).
+//!
+//! A file is read whole and checked whole; whatever is wrong with it is an [`InputError`] that names the file, the line and
+//! the field, what was found and what was expected. Files are written under a temporary name and renamed.
+
+mod builtin;
+mod error;
+mod poses;
+mod rig;
+mod robot;
+mod source;
+mod write;
+
+pub use builtin::{RIGS, ROBOTS};
+pub use error::{InputError, Problem};
+pub use poses::{Dataset, PairingId, PoseRow, RowWarning, write_poses};
+pub use rig::{Bar, NamedPoint, Rig};
+pub use robot::{Calibration, Coupling, EncoderFacts, JointLimits, Robot};
+pub use source::Source;
+pub use write::{WriteError, write_atomically};

@@ -1,0 +1,404 @@
+//! `robot.toml`: a chain, its limits and encoders, and when and from what it was calibrated.
+
+use std::ops::Range;
+
+use ballbar::{Chain, JointKind, MAX_JOINTS};
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+use toml_edit::{DocumentMut, Item, Table, value};
+
+use super::ROBOTS;
+use super::error::{InputError, Problem};
+use super::source::Source;
+use crate::units::{ScreenUnit, m_from_mm};
+
+/// A robot as its file describes it.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// What the file calls it, or else the file's own name.
+    pub name: String,
+    /// Links, joints and their parameters, SI units.
+    pub chain: Chain<f64>,
+    /// Limits of each joint's encoder output, radians or metres.
+    pub limits: Vec<JointLimits>,
+    /// What is known of each joint's encoder.
+    pub encoders: Vec<EncoderFacts>,
+    /// The table that a fit leaves in the file; `None` for a design.
+    pub calibration: Option<Calibration>,
+    source: Source,
+}
+
+/// Limits of a joint's encoder output q, radians or metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLimits {
+    /// Lower limit.
+    pub min: f64,
+    /// Upper limit.
+    pub max: f64,
+}
+
+impl JointLimits {
+    /// Whether `q` lies within, limits included.
+    pub fn contain(&self, q: f64) -> bool {
+        (self.min..=self.max).contains(&q)
+    }
+}
+
+/// How a joint's encoder counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EncoderFacts {
+    /// Counts, after quadrature and gearing, per radian or metre of the joint; `None` where the file does not say.
+    pub counts_per_unit: Option<f64>,
+    /// Whether counts rise when the joint turns the positive way.
+    pub rises: bool,
+    /// Another joint whose motion turns this one.
+    pub coupling: Option<Coupling>,
+}
+
+/// A joint that is turned along by another one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coupling {
+    /// Index of the other joint, from 0.
+    pub joint: usize,
+    /// Turn of this joint per turn of the other.
+    pub ratio: f64,
+}
+
+/// When, from what and how well a robot was calibrated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    /// Time of the fit, RFC 3339.
+    pub when: String,
+    /// The program and its version.
+    pub by: String,
+    /// The robot that the fit began with.
+    pub from_robot: String,
+    /// Files of poses.
+    pub from_poses: Vec<String>,
+    /// Number of poses.
+    pub poses: usize,
+    /// Number of parameters that were free.
+    pub free_parameters: usize,
+    /// RMS residual before the fit, millimetres.
+    pub rms_initial_mm: f64,
+    /// RMS residual after it, millimetres.
+    pub rms_mm: f64,
+    /// RMS residual of poses left out of the fit (cross-validation), millimetres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_rms_mm: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RobotToml {
+    name: Option<String>,
+    links: Vec<LinkToml>,
+    joints: Vec<Spanned<JointToml>>,
+    calibration: Option<Calibration>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LinkToml {
+    translation_mm: [Spanned<f64>; 3],
+    rotation_deg: [Spanned<f64>; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JointToml {
+    #[serde(rename = "type")]
+    kind: KindToml,
+    offset_deg: Option<Spanned<f64>>,
+    offset_mm: Option<Spanned<f64>>,
+    scale: Spanned<f64>,
+    min_deg: Option<Spanned<f64>>,
+    max_deg: Option<Spanned<f64>>,
+    min_mm: Option<Spanned<f64>>,
+    max_mm: Option<Spanned<f64>>,
+    counts_per_rev: Option<Spanned<f64>>,
+    counts_per_mm: Option<Spanned<f64>>,
+    sign: Option<Spanned<f64>>,
+    coupling: Option<Spanned<CouplingToml>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CouplingToml {
+    joint: usize,
+    ratio: Spanned<f64>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum KindToml {
+    Revolute,
+    Prismatic,
+}
+
+impl Robot {
+    /// Takes a built-in robot or reads a file.
+    ///
+    /// # Errors
+    /// [`InputError`] naming the line and what is wrong there.
+    pub fn open(argument: &str) -> Result<Self, InputError> {
+        Self::parse(&Source::named_or_read(argument, &ROBOTS, "robot")?)
+    }
+
+    /// Reads a robot from its TOML text.
+    ///
+    /// # Errors
+    /// As [`Robot::open`].
+    pub fn parse(source: &Source) -> Result<Self, InputError> {
+        let file: RobotToml = deserialize(source)?;
+        let joints = file.joints.len();
+        let of_file = |problem| InputError::of_file(source.name(), problem);
+        if !(1..=MAX_JOINTS).contains(&joints) {
+            return Err(of_file(Problem::JointCount { found: joints }));
+        }
+        if file.links.len() != joints + 1 {
+            return Err(of_file(Problem::LinkCount { found: file.links.len(), expected: joints + 1, joints }));
+        }
+
+        let mut parameters = Vec::new();
+        let mut kinds = Vec::new();
+        let mut limits = Vec::new();
+        let mut encoders = Vec::new();
+        for (i, link) in file.links.iter().enumerate() {
+            for length in &link.translation_mm {
+                parameters.push(m_from_mm(finite(source, "translation_mm", length)?));
+            }
+            for angle in &link.rotation_deg {
+                parameters.push(finite(source, "rotation_deg", angle)?.to_radians());
+            }
+            if let Some(joint) = file.joints.get(i) {
+                let reader = JointReader { source, number: i + 1, joints, span: joint.span(), joint: joint.as_ref() };
+                let (kind, offset, scale) = reader.model()?;
+                kinds.push(kind);
+                parameters.extend([offset, scale]);
+                limits.push(reader.limits()?);
+                encoders.push(reader.encoder()?);
+            }
+        }
+        let chain = Chain::new(&kinds, &parameters).map_err(|error| of_file(Problem::Toml(error.to_string())))?;
+        let name = file.name.unwrap_or_else(|| source.name().to_owned());
+        Ok(Self { name, chain, limits, encoders, calibration: file.calibration, source: source.clone() })
+    }
+
+    /// The file or built-in that this robot was read from.
+    pub fn source_name(&self) -> &str {
+        self.source.name()
+    }
+
+    /// The same file, comments and all, with other parameters and a `[calibration]` table.
+    ///
+    /// # Errors
+    /// The reason why the text could not be edited.
+    pub fn calibrated_toml(&self, chain: &Chain<f64>, calibration: &Calibration) -> Result<String, toml_edit::TomlError> {
+        let mut document: DocumentMut = self.source.text().parse()?;
+        for i in 0..=chain.joints() {
+            let Some(link) = chain.link(i) else { continue };
+            let translation = link.translation_m.map(|m| ScreenUnit::Millimetre.from_si(m));
+            let rotation = [link.alpha_rad, link.beta_rad, link.gamma_rad].map(f64::to_degrees);
+            set_numbers(&mut document["links"][i]["translation_mm"], translation.iter().copied());
+            set_numbers(&mut document["links"][i]["rotation_deg"], rotation.into_iter());
+            if let Some(joint) = chain.joint(i) {
+                let unit = ScreenUnit::from(joint.kind);
+                set_number(&mut document["joints"][i][&format!("offset_{}", unit.name())], unit.from_si(joint.offset));
+                set_number(&mut document["joints"][i]["scale"], joint.scale);
+            }
+        }
+        document.insert("calibration", Item::Table(calibration_table(calibration)));
+        Ok(document.to_string())
+    }
+}
+
+/// Joint `i` of a file, being checked.
+struct JointReader<'a> {
+    source: &'a Source,
+    number: usize,
+    joints: usize,
+    span: Range<usize>,
+    joint: &'a JointToml,
+}
+
+impl JointReader<'_> {
+    fn kind(&self) -> (JointKind, &'static str) {
+        match self.joint.kind {
+            KindToml::Revolute => (JointKind::Revolute, "revolute"),
+            KindToml::Prismatic => (JointKind::Prismatic, "prismatic"),
+        }
+    }
+
+    fn model(&self) -> Result<(JointKind, f64, f64), InputError> {
+        let joint = self.joint;
+        let (_, offset) = self.value("offset", ("offset_deg", &joint.offset_deg), ("offset_mm", &joint.offset_mm))?;
+        let scale = finite(self.source, "scale", &joint.scale)?;
+        if scale == 0.0 {
+            let problem = Problem::Number { field: "scale".into(), found: "0".into(), expected: "a number that is not zero" };
+            return Err(InputError::at(self.source, joint.scale.span(), problem));
+        }
+        Ok((self.kind().0, offset, scale))
+    }
+
+    fn limits(&self) -> Result<JointLimits, InputError> {
+        let joint = self.joint;
+        let (span, min) = self.value("min", ("min_deg", &joint.min_deg), ("min_mm", &joint.min_mm))?;
+        let (_, max) = self.value("max", ("max_deg", &joint.max_deg), ("max_mm", &joint.max_mm))?;
+        if min >= max {
+            let unit = ScreenUnit::from(self.kind().0);
+            let problem = Problem::Limits { joint: self.number, min: unit.from_si(min), max: unit.from_si(max) };
+            return Err(InputError::at(self.source, span, problem));
+        }
+        Ok(JointLimits { min, max })
+    }
+
+    fn encoder(&self) -> Result<EncoderFacts, InputError> {
+        let joint = self.joint;
+        let ((_, own), (_, other)) =
+            self.by_kind(("counts_per_rev", &joint.counts_per_rev), ("counts_per_mm", &joint.counts_per_mm));
+        if let Some(other) = other {
+            return Err(self.wrong_unit(other.span(), "counts_per_rev", "counts_per_mm"));
+        }
+        let counts = own.as_ref().map(|counts| positive(self.source, "counts_per_rev or counts_per_mm", counts)).transpose()?;
+        let unit_si = match self.kind().0 {
+            JointKind::Revolute => std::f64::consts::TAU,
+            JointKind::Prismatic => m_from_mm(1.0),
+        };
+        Ok(EncoderFacts {
+            counts_per_unit: counts.map(|counts| counts / unit_si),
+            rises: self.rises()?,
+            coupling: self.coupling()?,
+        })
+    }
+
+    fn rises(&self) -> Result<bool, InputError> {
+        let Some(sign) = &self.joint.sign else { return Ok(true) };
+        match *sign.as_ref() {
+            1.0 => Ok(true),
+            -1.0 => Ok(false),
+            found => {
+                let problem = Problem::Number { field: "sign".into(), found: found.to_string(), expected: "1 or -1" };
+                Err(InputError::at(self.source, sign.span(), problem))
+            }
+        }
+    }
+
+    fn coupling(&self) -> Result<Option<Coupling>, InputError> {
+        let Some(coupling) = &self.joint.coupling else { return Ok(None) };
+        let to = coupling.as_ref().joint;
+        if !(1..=self.joints).contains(&to) || to == self.number {
+            let problem = Problem::Coupling { joint: self.number, to, joints: self.joints };
+            return Err(InputError::at(self.source, coupling.span(), problem));
+        }
+        let ratio = finite(self.source, "ratio", &coupling.as_ref().ratio)?;
+        Ok(Some(Coupling { joint: to - 1, ratio }))
+    }
+
+    /// The value of a key that has one name for angles and one for slides, in SI, and its place in the text.
+    fn value(&self, stem: &str, deg: Key<'_>, mm: Key<'_>) -> Result<(Range<usize>, f64), InputError> {
+        let ((own_key, own), (_, other)) = self.by_kind(deg, mm);
+        if let Some(other) = other {
+            return Err(self.wrong_unit(other.span(), deg.0, mm.0));
+        }
+        let unit = ScreenUnit::from(self.kind().0);
+        let Some(own) = own else {
+            let key = format!("{stem}_{}", unit.name());
+            return Err(InputError::at(self.source, self.span.clone(), Problem::JointKeyMissing { joint: self.number, key }));
+        };
+        Ok((own.span(), unit.to_si(finite(self.source, own_key, own)?)))
+    }
+
+    /// The key that fits this joint, then the one that does not.
+    fn by_kind<'k>(&self, angle: Key<'k>, slide: Key<'k>) -> (Key<'k>, Key<'k>) {
+        match self.kind().0 {
+            JointKind::Revolute => (angle, slide),
+            JointKind::Prismatic => (slide, angle),
+        }
+    }
+
+    fn wrong_unit(&self, span: Range<usize>, deg_key: &'static str, mm_key: &'static str) -> InputError {
+        let (kind, name) = self.kind();
+        let (expected, key) = match kind {
+            JointKind::Revolute => (deg_key, mm_key),
+            JointKind::Prismatic => (mm_key, deg_key),
+        };
+        InputError::at(self.source, span, Problem::JointUnit { key, kind: name, expected: expected.to_owned() })
+    }
+}
+
+/// A key of the file and what stands there.
+type Key<'a> = (&'static str, &'a Option<Spanned<f64>>);
+
+/// Reads a TOML text into its serde form.
+pub(super) fn deserialize<T: for<'de> Deserialize<'de>>(source: &Source) -> Result<T, InputError> {
+    toml::from_str(source.text()).map_err(|error| {
+        let problem = Problem::Toml(error.message().replace('\n', ", "));
+        match error.span() {
+            Some(span) => InputError::at(source, span, problem),
+            None => InputError::of_file(source.name(), problem),
+        }
+    })
+}
+
+/// A number that is finite.
+pub(super) fn finite(source: &Source, field: &str, number: &Spanned<f64>) -> Result<f64, InputError> {
+    checked(source, field, number, f64::is_finite, "a finite number")
+}
+
+/// A number that is finite and above zero.
+pub(super) fn positive(source: &Source, field: &str, number: &Spanned<f64>) -> Result<f64, InputError> {
+    checked(source, field, number, |x| x.is_finite() && x > 0.0, "a number above zero")
+}
+
+fn checked(
+    source: &Source,
+    field: &str,
+    number: &Spanned<f64>,
+    is_good: fn(f64) -> bool,
+    expected: &'static str,
+) -> Result<f64, InputError> {
+    let found = *number.as_ref();
+    if is_good(found) {
+        return Ok(found);
+    }
+    let problem = Problem::Number { field: field.to_owned(), found: found.to_string(), expected };
+    Err(InputError::at(source, number.span(), problem))
+}
+
+/// Replaces a number and keeps the comment behind it.
+fn set_number(item: &mut Item, number: f64) {
+    let decor = item.as_value().map(|old| old.decor().clone());
+    *item = value(number);
+    if let (Some(new), Some(decor)) = (item.as_value_mut(), decor) {
+        *new.decor_mut() = decor;
+    }
+}
+
+fn set_numbers(item: &mut Item, numbers: impl Iterator<Item = f64>) {
+    if let Some(array) = item.as_array_mut() {
+        for (i, number) in numbers.enumerate() {
+            array.replace(i, number);
+        }
+    }
+}
+
+fn calibration_table(calibration: &Calibration) -> Table {
+    let mut table = Table::new();
+    table
+        .decor_mut()
+        .set_prefix("\n# The links and joints of this file hold fitted parameters; comments beside them are the design's.\n");
+    table.insert("when", value(&calibration.when));
+    table.insert("by", value(&calibration.by));
+    table.insert("from_robot", value(&calibration.from_robot));
+    table.insert("from_poses", value(calibration.from_poses.iter().collect::<toml_edit::Array>()));
+    table.insert("poses", value(calibration.poses as i64));
+    table.insert("free_parameters", value(calibration.free_parameters as i64));
+    table.insert("rms_initial_mm", value(calibration.rms_initial_mm));
+    table.insert("rms_mm", value(calibration.rms_mm));
+    if let Some(rms_mm) = calibration.held_out_rms_mm {
+        table.insert("held_out_rms_mm", value(rms_mm));
+    }
+    table
+}

@@ -1,0 +1,62 @@
+//! The text that a file or a built-in holds, with the name to show for it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::error::{InputError, Problem};
+
+/// A named text. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Source {
+    name: Arc<str>,
+    text: Arc<str>,
+}
+
+impl Source {
+    /// A text that comes from no file.
+    pub fn new(name: &str, text: &str) -> Self {
+        Self { name: name.into(), text: text.into() }
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`Problem::Unreadable`] when it cannot be opened or is not UTF-8.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let name = path.display().to_string();
+        let text =
+            std::fs::read_to_string(path).map_err(|error| InputError::of_file(&name, Problem::Unreadable(error.to_string())))?;
+        Ok(Self::new(&name, &text))
+    }
+
+    /// Takes a built-in of that name, or else reads the file of that name.
+    ///
+    /// # Errors
+    /// [`Problem::NoSuchFile`] with the built-in names when there is neither, or as [`Source::read`].
+    pub fn named_or_read(argument: &str, builtins: &[(&str, &str)], what: &'static str) -> Result<Self, InputError> {
+        if let Some((name, text)) = builtins.iter().find(|(name, _)| *name == argument) {
+            return Ok(Self::new(&format!("{name} (built in)"), text));
+        }
+        let path = Path::new(argument);
+        if !path.exists() {
+            let names = builtins.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+            return Err(InputError::of_file(argument, Problem::NoSuchFile { what, builtins: names }));
+        }
+        Self::read(path)
+    }
+
+    /// What to call it in messages.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The whole text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Line number, from 1, of a byte.
+    pub fn line_of(&self, byte: usize) -> usize {
+        1 + self.text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
+    }
+}

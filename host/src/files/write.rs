@@ -1,0 +1,45 @@
+//! Writing a file so that no reader ever sees half of it.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use miette::Diagnostic;
+use thiserror::Error;
+
+/// A file could not be written; what stood there before still stands there.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{}: cannot be written: {error}", path.display())]
+#[diagnostic(help("Nothing was changed. Is the folder there, and may you write in it?"))]
+pub struct WriteError {
+    path: PathBuf,
+    error: std::io::Error,
+}
+
+/// Writes `contents` beside `path` under a temporary name, flushes it to the disk and renames it onto `path`.
+///
+/// # Errors
+/// [`WriteError`] with the operating system's reason; an older file of that name is left as it was.
+pub fn write_atomically(path: &Path, contents: &str) -> Result<(), WriteError> {
+    let attempt = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut builder = tempfile::Builder::new();
+        with_usual_permissions(&mut builder);
+        let mut file = builder.prefix(".host-cal-").tempfile_in(folder)?;
+        file.write_all(contents.as_bytes())?;
+        file.as_file().sync_all()?;
+        file.persist(path).map_err(|error| error.error)?;
+        Ok(())
+    };
+    attempt().map_err(|error| WriteError { path: path.to_owned(), error })
+}
+
+/// Temporary files are private by default; a file renamed into place should have the mode that a plain write gives, which is
+/// what the process's umask leaves of this.
+#[cfg(unix)]
+fn with_usual_permissions(builder: &mut tempfile::Builder<'_, '_>) {
+    use std::os::unix::fs::PermissionsExt;
+    builder.permissions(std::fs::Permissions::from_mode(0o666));
+}
+
+#[cfg(not(unix))]
+fn with_usual_permissions(_: &mut tempfile::Builder<'_, '_>) {}

@@ -1,0 +1,204 @@
+//! A fit, whole: from a design and a dataset to parameters, how sure they are, and what poses left out say of them.
+
+use std::collections::HashMap;
+use std::time::{Duration, Instant};
+
+use ballbar::{Chain, Damping, FreeParameters, Measurement, Parameter, ParameterUnit};
+use miette::Diagnostic;
+use thiserror::Error;
+
+use super::hold::{Hold, HoldError, free_parameters};
+use super::identifiability::Identifiability;
+use super::lm::{LmOptions, Solution, solve};
+use super::residuals::{Outlier, PairingResiduals, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals_m};
+use super::uncertainty::Uncertainty;
+use crate::files::{Dataset, Robot};
+
+/// What to hold, and how to step.
+#[derive(Clone, Debug, Default)]
+pub struct FitOptions {
+    /// Parameters that stay at their design values.
+    pub hold: Hold,
+    /// λI or λ·diag.
+    pub damping: Damping,
+}
+
+/// Why there is no fit.
+#[derive(Clone, Debug, PartialEq, Error, Diagnostic)]
+pub enum FitError {
+    /// A fit without redundancy would meet every length and prove nothing.
+    #[error("{rows} poses for {free} free parameters, expected more poses than free parameters")]
+    #[diagnostic(help("Measure more poses (the paper took some 800), or hold more parameters with --hold."))]
+    NoRedundancy {
+        /// Poses given.
+        rows: usize,
+        /// Parameters that would be free.
+        free: usize,
+    },
+    /// `--hold` cannot be used with this robot.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Hold(#[from] HoldError),
+}
+
+/// One parameter before and after.
+#[derive(Clone, Debug)]
+pub struct FittedParameter {
+    /// Which.
+    pub parameter: Parameter,
+    /// Unit of the values.
+    pub unit: ParameterUnit,
+    /// Design value, SI.
+    pub initial: f64,
+    /// Fitted value, SI; the design value where held.
+    pub fitted: f64,
+    /// Standard deviation, SI; `None` where held or undetermined.
+    pub std: Option<f64>,
+    /// Why it was held; `None` where free.
+    pub held: Option<String>,
+}
+
+/// How well a fit to some poses predicts the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CrossValidation {
+    /// Parts that were left out in turn.
+    pub folds: usize,
+    /// RMS residual of the poses while they were left out, metres.
+    pub rms_m: f64,
+}
+
+/// The result of a fit.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The fitted chain, why the solve ended, its iterations and the course of its RMS.
+    pub solution: Solution,
+    /// Wall time of the solve alone.
+    pub solve_time: Duration,
+    /// What the poses can tell, judged at the design values.
+    pub identifiability: Identifiability,
+    /// Deviations and condition at the fitted values.
+    pub uncertainty: Uncertainty,
+    /// All parameters, in order.
+    pub parameters: Vec<FittedParameter>,
+    /// Residuals with the design values.
+    pub initial: ResidualSummary,
+    /// Residuals with the fitted values.
+    pub fitted: ResidualSummary,
+    /// Residuals by pairing with the design values.
+    pub initial_by_pairing: Vec<PairingResiduals>,
+    /// Residuals by pairing with the fitted values.
+    pub fitted_by_pairing: Vec<PairingResiduals>,
+    /// Residuals of all rows with the fitted values, metres.
+    pub residuals_m: Vec<f64>,
+    /// Rows that stand out after the fit.
+    pub outliers: Vec<Outlier>,
+    /// Correlation of residuals with the next ones measured; `None` for too few. Far from zero, something drifts or jumps.
+    pub neighbour_correlation: Option<f64>,
+    /// Prediction of poses left out; `None` when too few are left to fit.
+    pub cross_validation: Option<CrossValidation>,
+}
+
+impl Fit {
+    /// Number of free parameters.
+    pub fn free_parameters(&self) -> usize {
+        self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
+    }
+
+    /// Whether the result is worth keeping: a minimum was reached, and poses left out of the fit are predicted better than by
+    /// the design (or, where none could be left out, the fitted ones are).
+    pub fn is_improvement(&self) -> bool {
+        let proven_rms_m = self.cross_validation.map_or(self.fitted.rms_m, |held_out| held_out.rms_m);
+        self.solution.status.is_minimum() && proven_rms_m <= self.initial.rms_m
+    }
+}
+
+/// Fits the robot's parameters to the dataset.
+///
+/// # Errors
+/// [`FitError`] when there are no more poses than free parameters, or when `--hold` names a parameter that the robot lacks.
+pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
+    let design = &robot.chain;
+    let measurements = dataset.measurements();
+    let identifiability = Identifiability::new(design, &measurements, &robot.limits);
+    let reasons = options.hold.reasons(design, &identifiability)?;
+    let free = free_parameters(&reasons);
+    if measurements.len() <= free.len() {
+        return Err(FitError::NoRedundancy { rows: measurements.len(), free: free.len() });
+    }
+
+    let lm = LmOptions { damping: options.damping, ..LmOptions::default() };
+    let start = Instant::now();
+    let solution = solve(design, &measurements, &free, &lm);
+    let solve_time = start.elapsed();
+
+    let uncertainty = Uncertainty::new(&solution.chain, &measurements, &free);
+    let residuals_before_m = residuals_m(design, dataset);
+    let residuals_after_m = residuals_m(&solution.chain, dataset);
+    Ok(Fit {
+        solve_time,
+        identifiability,
+        parameters: fitted_parameters(design, &solution.chain, &free, &uncertainty, reasons),
+        initial: ResidualSummary::new(&residuals_before_m),
+        fitted: ResidualSummary::new(&residuals_after_m),
+        initial_by_pairing: by_pairing(dataset, &residuals_before_m),
+        fitted_by_pairing: by_pairing(dataset, &residuals_after_m),
+        outliers: outliers(dataset, &residuals_after_m),
+        neighbour_correlation: neighbour_correlation(dataset, &residuals_after_m),
+        cross_validation: cross_validate(design, &measurements, &free, &lm),
+        residuals_m: residuals_after_m,
+        uncertainty,
+        solution,
+    })
+}
+
+fn fitted_parameters(
+    design: &Chain<f64>,
+    fitted: &Chain<f64>,
+    free: &FreeParameters,
+    uncertainty: &Uncertainty,
+    reasons: Vec<Option<String>>,
+) -> Vec<FittedParameter> {
+    let std_of = |index: usize| {
+        let position = free.indices().position(|free| free == index)?;
+        uncertainty.std[position]
+    };
+    let values = design.parameters().iter().zip(fitted.parameters()).zip(reasons).enumerate();
+    values
+        .map(|(index, ((&initial, &fitted), held))| {
+            let parameter = Parameter::from_index(index);
+            FittedParameter { parameter, unit: design.unit(parameter), initial, fitted, std: std_of(index), held }
+        })
+        .collect()
+}
+
+/// Five-fold cross-validation. Rows of the same joint vector stay together: lengths to other spheres of one pose are no
+/// independent proof of it.
+fn cross_validate(
+    design: &Chain<f64>,
+    measurements: &[Measurement<f64>],
+    free: &FreeParameters,
+    lm: &LmOptions,
+) -> Option<CrossValidation> {
+    const FOLDS: usize = 5;
+    let mut groups: HashMap<[u64; ballbar::MAX_JOINTS], usize> = HashMap::new();
+    let group_of_row: Vec<usize> = measurements
+        .iter()
+        .map(|measurement| {
+            let next = groups.len();
+            *groups.entry(measurement.q.as_array().map(f64::to_bits)).or_insert(next)
+        })
+        .collect();
+
+    let mut squares = 0.0;
+    for fold in 0..FOLDS {
+        let rows = || measurements.iter().zip(&group_of_row);
+        let kept: Vec<_> = rows().filter(|(_, group)| **group % FOLDS != fold).map(|(m, _)| *m).collect();
+        if kept.len() <= free.len() || groups.len() < FOLDS {
+            return None;
+        }
+        let kinematics = ballbar::Kinematics::new(&solve(design, &kept, free, lm).chain);
+        let left_out = rows().filter(|(_, group)| **group % FOLDS == fold);
+        squares += left_out.map(|(measurement, _)| kinematics.residual(measurement).powi(2)).sum::<f64>();
+    }
+    Some(CrossValidation { folds: FOLDS, rms_m: (squares / measurements.len() as f64).sqrt() })
+}

@@ -1,0 +1,322 @@
+//! Which parameters the poses can tell, and in words why the others not.
+
+use std::fmt;
+
+use ballbar::{Chain, JointKind, Measurement, Pairing, Parameter, ParameterUnit, Vector3};
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::observation::Observation;
+use super::pivoting::PivotedColumns;
+use super::spectrum::{RANK_THRESHOLD, Spectrum, column_scales, is_zero_column};
+use crate::files::{Dataset, JointLimits, Rig};
+use crate::units::ScreenUnit;
+
+/// How far a design value may plausibly be off: 5 mm, 0.5°, 0.5 %. A parameter whose standard deviation from these poses alone
+/// would exceed this is better left at its design value, which tells more than the poses do.
+pub const PLAUSIBLE_ERROR: [(ParameterUnit, f64); 3] =
+    [(ParameterUnit::Metre, 5e-3), (ParameterUnit::Radian, 0.5 * std::f64::consts::PI / 180.0), (ParameterUnit::One, 5e-3)];
+
+/// [`PLAUSIBLE_ERROR`] of a parameter, SI.
+pub fn plausible_error(unit: ParameterUnit) -> f64 {
+    PLAUSIBLE_ERROR.iter().find(|(of, _)| *of == unit).map_or(1.0, |&(_, error)| error)
+}
+
+/// What the poses say of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Finding {
+    /// It belongs to the independent subset.
+    Identified,
+    /// Whatever is measured at the tool, the parameters of the subset named here move it in the same way.
+    Redundant {
+        /// Those that mimic it, strongest first.
+        with: Vec<Parameter>,
+    },
+    /// Other measurements could tell it; in these poses the parameters named here change the lengths in the same way.
+    NotExcited {
+        /// Those that mimic it, strongest first.
+        with: Vec<Parameter>,
+    },
+    /// No length of these poses changes with it.
+    NoEffect,
+    /// Independent, but so weakly that noise would drown it.
+    Weak {
+        /// Standard deviation that these poses alone would give it, given the stronger ones; SI.
+        std: f64,
+        /// What the design value is trusted to; SI.
+        plausible: f64,
+        /// The parameter's unit.
+        unit: ParameterUnit,
+    },
+}
+
+impl Finding {
+    /// A word for machines: `identified`, `redundant`, `not_excited`, `no_effect`, `weak`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Identified => "identified",
+            Self::Redundant { .. } => "redundant",
+            Self::NotExcited { .. } => "not_excited",
+            Self::NoEffect => "no_effect",
+            Self::Weak { .. } => "weak",
+        }
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Identified => f.write_str("identified"),
+            Self::Redundant { with } => write!(f, "redundant with {}", list(with)),
+            Self::NotExcited { with } => write!(f, "not excited: in these poses it acts like {}", list(with)),
+            Self::NoEffect => f.write_str("not excited: no length of these poses changes with it"),
+            Self::Weak { std, plausible, unit } => {
+                let screen = ScreenUnit::from(*unit);
+                let (std, plausible) = (screen.from_si(*std), screen.from_si(*plausible));
+                let unit = if screen == ScreenUnit::One { String::new() } else { format!(" {}", screen.name()) };
+                write!(
+                    f,
+                    "weakly excited: its deviation would be {}{unit}, the design is trusted to {plausible}{unit}",
+                    significant(std)
+                )
+            }
+        }
+    }
+}
+
+/// Two significant digits, without an exponent.
+fn significant(value: f64) -> String {
+    let digits = (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.digits$}")
+}
+
+fn list(parameters: &[Parameter]) -> String {
+    const SHOWN: usize = 4;
+    let names: Vec<String> = parameters.iter().take(SHOWN).map(Parameter::to_string).collect();
+    match parameters.len().saturating_sub(SHOWN) {
+        0 => names.join(", "),
+        more => format!("{} and {more} more", names.join(", ")),
+    }
+}
+
+/// What a set of poses can tell about a chain.
+#[derive(Clone, Debug)]
+pub struct Identifiability {
+    /// Singular values of all columns.
+    pub spectrum: Spectrum,
+    /// One finding a parameter.
+    pub findings: Vec<Finding>,
+    /// RMS of what no linear change of the independent parameters explains, metres: the noise as the data show it. Zero when
+    /// there are no more rows than independent parameters.
+    pub noise_m: f64,
+    /// Rows seen.
+    pub rows: usize,
+}
+
+impl Identifiability {
+    /// Judges all parameters of `chain` by the weighted Jacobian at its present values.
+    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits]) -> Self {
+        let rows = measurements.len();
+        let observation = Observation::new(chain, measurements).compressed();
+        let spectrum = Spectrum::new(&observation.jacobian);
+        let independent = independent_columns(chain, &observation.jacobian, spectrum.rank);
+        let noise_m = unexplained_rms(&observation, &independent, rows);
+
+        let reference = reference_jacobian(chain, limits);
+        let always_independent = independent_columns(chain, &reference, Spectrum::new(&reference).rank);
+
+        let mut findings = vec![Finding::Identified; chain.parameter_count()];
+        for (index, std) in weak_columns(chain, &observation.jacobian, &independent, noise_m) {
+            let unit = chain.unit(Parameter::from_index(index));
+            findings[index] = Finding::Weak { std, plausible: plausible_error(unit), unit };
+        }
+        let largest = observation.jacobian.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
+        for index in (0..chain.parameter_count()).filter(|index| !independent.contains(index)) {
+            findings[index] = if is_zero_column(observation.jacobian.column(index).norm(), largest) {
+                Finding::NoEffect
+            } else if always_independent.contains(&index) {
+                Finding::NotExcited { with: mimics(&observation.jacobian, &independent, index) }
+            } else {
+                Finding::Redundant { with: mimics(&reference, &always_independent, index) }
+            };
+        }
+        Self { spectrum, findings, noise_m, rows }
+    }
+
+    /// The parameters that the data identify, ascending.
+    pub fn identified(&self) -> Vec<usize> {
+        (0..self.findings.len()).filter(|&index| self.findings[index] == Finding::Identified).collect()
+    }
+
+    /// The parameters that the data do not identify, with the reason.
+    pub fn not_identified(&self) -> impl Iterator<Item = (Parameter, &Finding)> + '_ {
+        let findings = self.findings.iter().enumerate().filter(|(_, finding)| **finding != Finding::Identified);
+        findings.map(|(index, finding)| (Parameter::from_index(index), finding))
+    }
+}
+
+/// A largest independent subset of the columns, ascending: first as many as possible of those that the paper leaves free, then
+/// of those it holds. In each group in the order of what the scaled columns add, the second group after what the first explains.
+fn independent_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, rank: usize) -> Vec<usize> {
+    let all = 0..chain.parameter_count();
+    let (held, free): (Vec<_>, Vec<_>) = all.partition(|&index| chain.is_conventionally_held(Parameter::from_index(index)));
+    let scales = column_scales(jacobian);
+    let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| jacobian[(row, column)] / scales[column]);
+
+    // Scaled columns have unit norm, so pivots compare with 1.
+    let first = PivotedColumns::new(scaled.select_columns(&free), RANK_THRESHOLD);
+    let rest = scaled.select_columns(&held);
+    let unexplained = &rest - &first.basis * first.basis.tr_mul(&rest);
+    let second = PivotedColumns::new(unexplained, RANK_THRESHOLD);
+
+    let mut chosen: Vec<usize> = first.order.iter().map(|&k| free[k]).chain(second.order.iter().map(|&k| held[k])).collect();
+    chosen.truncate(rank);
+    chosen.sort_unstable();
+    chosen
+}
+
+/// RMS of the residual's part outside the span of the columns, per degree of freedom.
+fn unexplained_rms(observation: &Observation, independent: &[usize], rows: usize) -> f64 {
+    let freedom = rows.saturating_sub(independent.len());
+    if freedom == 0 {
+        return 0.0;
+    }
+    let q = observation.columns(independent).qr().q();
+    let unexplained = &observation.residual_m - &q * (q.transpose() * &observation.residual_m);
+    (unexplained.norm_squared() / freedom as f64).sqrt()
+}
+
+/// Of the independent columns those that noise would drown, with the standard deviation it would leave them.
+///
+/// Columns are scaled by the plausible error, so that a pivot is the size, over all rows, of what a plausible error of the
+/// parameter does to the lengths and the stronger parameters cannot do; `noise / pivot` is then its standard deviation in
+/// units of the plausible error.
+fn weak_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, independent: &[usize], noise_m: f64) -> Vec<(usize, f64)> {
+    let plausible: Vec<f64> =
+        independent.iter().map(|&index| plausible_error(chain.unit(Parameter::from_index(index)))).collect();
+    let mut effects = jacobian.select_columns(independent);
+    for (mut column, plausible) in effects.column_iter_mut().zip(&plausible) {
+        column *= *plausible;
+    }
+    let PivotedColumns { order, pivots, .. } = PivotedColumns::new(effects, 0.0);
+    let drowned = order.into_iter().zip(pivots).filter(|&(_, pivot)| pivot < noise_m);
+    drowned.map(|(column, pivot)| (independent[column], plausible[column] * noise_m / pivot)).collect()
+}
+
+/// Which columns of the subset make up another column, strongest first.
+fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<Parameter> {
+    let columns = jacobian.select_columns(subset);
+    let target = jacobian.column(index).into_owned();
+    let qr = columns.clone().qr();
+    let Some(coefficients) = qr.r().solve_upper_triangular(&(qr.q().transpose() * &target)) else { return Vec::new() };
+    let mut shares: Vec<(usize, f64)> = subset
+        .iter()
+        .zip(columns.column_iter())
+        .zip(coefficients.iter())
+        .map(|((&i, column), c)| (i, c.abs() * column.norm()))
+        .collect();
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // A thousandth part is not what makes a column look like another.
+    let strongest = shares.first().map_or(0.0, |share| share.1);
+    shares.iter().take_while(|share| share.1 > 1e-3 * strongest).map(|share| Parameter::from_index(share.0)).collect()
+}
+
+/// The Jacobian of an experiment that excites whatever can be excited: random poses within the limits, random pairings of
+/// three chucks and three spheres. What is dependent here is dependent in every experiment.
+fn reference_jacobian(chain: &Chain<f64>, limits: &[JointLimits]) -> DMatrix<f64> {
+    const ROWS_PER_PARAMETER: usize = 4;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut point = |reach_m: f64| Vector3::from_fn(|_, _| rng.random_range(-reach_m..reach_m));
+    let chucks: [Vector3<f64>; 3] = std::array::from_fn(|_| point(1.0));
+    let spheres: [Vector3<f64>; 3] = std::array::from_fn(|_| point(0.2));
+    let count = ROWS_PER_PARAMETER * chain.parameter_count();
+    let measurements: Vec<Measurement<f64>> = (0..count)
+        .filter_map(|i| {
+            let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
+            let pairing = Pairing { chuck_base_m: chucks[i % 3], sphere_tool_m: spheres[i / 3 % 3] };
+            let q = chain.joint_vector(&q).ok()?;
+            Some(Measurement { pairing, q, length_m: 0.0, weight: 1.0 })
+        })
+        .collect();
+    Observation::new(chain, &measurements).compressed().jacobian
+}
+
+/// The most parameters of a chain that so many chucks and spheres can identify: `N − 6 + g(chucks) + g(spheres)`,
+/// `g(1, 2, 3) = 0, 2, 3`, as long as three of them do not stand in one line.
+///
+/// Each side loses what it cannot see: one point the three turns about it, two points the turn about their line.
+pub fn bound_by_ends(chain: &Chain<f64>, chucks: usize, spheres: usize) -> usize {
+    let seen = |points: usize| [0, 0, 2, 3][points.min(3)];
+    (chain.independent_parameters() + seen(chucks) + seen(spheres)).saturating_sub(6)
+}
+
+/// [`bound_by_ends`] of the chucks and spheres that the poses use.
+pub fn bound_by_pairings(chain: &Chain<f64>, dataset: &Dataset) -> usize {
+    let (chucks, spheres) = ends_used(dataset);
+    bound_by_ends(chain, chucks, spheres)
+}
+
+fn ends_used(dataset: &Dataset) -> (usize, usize) {
+    let count = |mut ends: Vec<usize>| {
+        ends.sort_unstable();
+        ends.dedup();
+        ends.len()
+    };
+    let pairings = dataset.pairings();
+    (count(pairings.iter().map(|p| p.chuck).collect()), count(pairings.iter().map(|p| p.sphere).collect()))
+}
+
+/// What about these poses leaves parameters unidentified, and what to measure instead; one sentence each.
+pub fn remarks(chain: &Chain<f64>, dataset: &Dataset, rig: &Rig, limits: &[JointLimits]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let (chucks, spheres) = ends_used(dataset);
+    let (bound, independent) = (bound_by_pairings(chain, dataset), chain.independent_parameters());
+    if bound < independent {
+        let pairings = dataset.pairings();
+        let what = match pairings.as_slice() {
+            [only] => format!("One pairing ({})", rig.pairing_name(*only)),
+            several => format!("{} pairings of {} and {}", several.len(), plural(chucks, "chuck"), plural(spheres, "sphere")),
+        };
+        remarks.push(format!(
+            "{what} can identify at most {bound} parameters; three chucks and three spheres could identify {independent}."
+        ));
+    }
+    if spheres < 3 {
+        remarks.push(format!("All lengths end at {}: turns of the tool about {} change none of them. Measure to three spheres that are not in one line.",
+            plural(spheres, "sphere"), if spheres == 1 { "it" } else { "their line" }));
+    }
+    if chucks < 3 {
+        remarks.push(format!("All lengths begin at {}: turns of the whole robot about {} change none of them. Measure from three chucks that are not in one line.",
+            plural(chucks, "chuck"), if chucks == 1 { "it" } else { "their line" }));
+    }
+    remarks.extend(joints_that_hardly_moved(chain, dataset, limits));
+    remarks
+}
+
+fn plural(count: usize, noun: &str) -> String {
+    if count == 1 { format!("one {noun}") } else { format!("{count} {noun}s") }
+}
+
+fn joints_that_hardly_moved(chain: &Chain<f64>, dataset: &Dataset, limits: &[JointLimits]) -> Vec<String> {
+    const HARDLY: f64 = 0.1;
+    let joints = chain.joint_kinds().iter().zip(limits).enumerate();
+    joints
+        .filter_map(|(i, (&kind, limits))| {
+            let values = dataset.rows.iter().map(|row| row.measurement.q.as_array()[i]);
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
+            let share = (high - low) / (limits.max - limits.min);
+            let unit = ScreenUnit::from(kind);
+            let verb = if kind == JointKind::Revolute { "turned" } else { "moved" };
+            (share < HARDLY).then(|| {
+                format!(
+                    "Joint {} {verb} by {:.1} {} only, {:.0} % of its range: its scale and the links beside it are hard to tell apart.",
+                    i + 1,
+                    unit.from_si(high - low),
+                    unit.name(),
+                    100.0 * share
+                )
+            })
+        })
+        .collect()
+}

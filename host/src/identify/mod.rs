@@ -1,0 +1,35 @@
+//! From measured lengths to parameters.
+//!
+//! ```text
+//! Dataset ─▶ Observation (J, f at the start) ─▶ Identifiability (rank, independent subset, reasons)
+//!                                                     │ Hold
+//!                                                     ▼
+//!                                    FreeParameters ─▶ lm::solve ─▶ Fit (deviations, residuals, outliers, held-out RMS)
+//! ```
+//!
+//! `docs/identification.md` says how each decision is made and why.
+
+mod fit;
+mod hold;
+mod identifiability;
+mod lm;
+mod normality;
+mod observation;
+mod pivoting;
+mod residuals;
+mod spectrum;
+mod uncertainty;
+
+pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, fit};
+pub use hold::{Hold, HoldError};
+pub use identifiability::{
+    Finding, Identifiability, PLAUSIBLE_ERROR, bound_by_ends, bound_by_pairings, plausible_error, remarks,
+};
+pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
+pub use normality::{AndersonDarling, anderson_darling};
+pub use observation::Observation;
+pub use residuals::{
+    Outlier, OutlierTest, PairingResiduals, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals_m,
+};
+pub use spectrum::{RANK_THRESHOLD, Spectrum};
+pub use uncertainty::Uncertainty;

@@ -1,0 +1,19 @@
+//! Calibration of a robot's kinematics from ball-bar lengths: the library behind the `host-cal` command.
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
+//! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
+//! | [`simulate`] | poses on hemispherical shells, simulated lengths, tool error over the workspace |
+//! | [`paper`] | the paper's experiment, and its numbers |
+//! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
+//!
+//! SI units inside; millimetres and degrees in files and on screens, converted at the edge (see [`units`]).
+#![forbid(unsafe_code)]
+
+pub mod cmd;
+pub mod files;
+pub mod identify;
+pub mod paper;
+pub mod simulate;
+pub mod units;
