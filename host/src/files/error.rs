@@ -196,21 +196,21 @@ impl Problem {
 #[error("{}: {problem}", .place)]
 pub struct InputError {
     place: String,
-    problem: Problem,
-    at: Option<(NamedSource<String>, Range<usize>)>,
+    problem: Box<Problem>,
+    at: Option<Box<(NamedSource<String>, Range<usize>)>>,
 }
 
 impl InputError {
     /// A problem of a whole file.
     pub(crate) fn of_file(name: &str, problem: Problem) -> Self {
-        Self { place: name.to_owned(), problem, at: None }
+        Self { place: name.to_owned(), problem: Box::new(problem), at: None }
     }
 
     /// A problem at some bytes of a text.
     pub(crate) fn at(source: &Source, span: Range<usize>, problem: Problem) -> Self {
         let place = format!("{}:{}", source.name(), source.line_of(span.start));
         let named = NamedSource::new(source.name(), source.text().to_owned());
-        Self { place, problem, at: Some((named, span)) }
+        Self { place, problem: Box::new(problem), at: Some(Box::new((named, span))) }
     }
 
     /// What is wrong.
@@ -225,11 +225,11 @@ impl Diagnostic for InputError {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.at.as_ref().map(|(source, _)| source as &dyn SourceCode)
+        self.at.as_ref().map(|at| &at.0 as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let (_, span) = self.at.as_ref()?;
+        let (_, span) = self.at.as_deref()?;
         Some(Box::new(std::iter::once(LabeledSpan::underline(span.clone()))))
     }
 }

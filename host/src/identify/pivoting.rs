@@ -50,12 +50,14 @@ impl PivotedColumns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::dmatrix;
 
     #[test]
     fn each_pivot_is_what_the_column_adds() {
         // Columns: (3, 0, 0), (3, 4, 0), their sum, (0, 0, 1).
-        let columns = PivotedColumns::new(dmatrix![3.0, 3.0, 6.0, 0.0; 0.0, 4.0, 4.0, 0.0; 0.0, 0.0, 0.0, 1.0], 1e-12);
+        let columns = PivotedColumns::new(
+            DMatrix::from_row_slice(3, 4, &[3.0, 3.0, 6.0, 0.0, 0.0, 4.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            1e-12,
+        );
         assert_eq!(columns.order.len(), 3, "the fourth is dependent");
         assert_eq!(columns.order[0], 2);
         assert!((columns.pivots[0] - 52.0_f64.sqrt()).abs() < 1e-14);

@@ -25,10 +25,10 @@ pub struct StewartPlatform {
 pub fn amplification(platform: &StewartPlatform) -> Option<f64> {
     let corner = |side_m: f64, angle: f64| side_m / 3.0_f64.sqrt() * Vector3::new(angle.cos(), angle.sin(), 0.0);
     let horizontal_m = (corner(platform.plate_side_m, FRAC_PI_3) - corner(platform.base_side_m, 0.0)).norm();
-    let height_m = (platform.bar_m.powi(2) - horizontal_m.powi(2)).sqrt();
-    if !(height_m > 0.0) {
+    if platform.bar_m <= horizontal_m {
         return None;
     }
+    let height_m = (platform.bar_m.powi(2) - horizontal_m.powi(2)).sqrt();
     let mut legs = Matrix6::zeros();
     for chuck in 0..3 {
         let angle = TAU / 3.0 * f64::from(chuck);

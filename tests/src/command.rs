@@ -1,0 +1,42 @@
+//! Runs the `host-cal` binary as a user would.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::LazyLock;
+
+/// Builds the binary once (nothing to do when it is fresh).
+static HOST_CAL: LazyLock<PathBuf> = LazyLock::new(|| {
+    let build = escargot::CargoBuild::new().package("host-cal").bin("host-cal").current_target();
+    build.run().expect("host-cal builds").path().to_owned()
+});
+
+/// What a run printed, and how it ended.
+#[derive(Debug)]
+pub struct Run {
+    /// Exit code.
+    pub code: i32,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl Run {
+    /// The one JSON document on stdout.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.stdout)
+            .unwrap_or_else(|error| panic!("stdout is not JSON ({error}):\n{}\n{}", self.stdout, self.stderr))
+    }
+
+    /// Everything, for a snapshot.
+    pub fn transcript(&self) -> String {
+        format!("exit code {}\n--- stdout ---\n{}--- stderr ---\n{}", self.code, self.stdout, self.stderr)
+    }
+}
+
+/// Runs `host-cal` in a folder.
+pub fn host_cal_in(folder: &Path, args: &[&str]) -> Run {
+    let output = Command::new(&*HOST_CAL).args(args).current_dir(folder).env("NO_COLOR", "1").output().expect("host-cal starts");
+    let text = |bytes| String::from_utf8(bytes).expect("host-cal prints UTF-8");
+    Run { code: output.status.code().expect("host-cal ends by itself"), stdout: text(output.stdout), stderr: text(output.stderr) }
+}

@@ -1,0 +1,5 @@
+//! What the tests in `tests/` share.
+
+pub mod command;
+pub mod data;
+pub mod naive;
