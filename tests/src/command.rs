@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 /// Builds the binary once (nothing to do when it is fresh).
 static HOST_CAL: LazyLock<PathBuf> = LazyLock::new(|| {
-    let build = escargot::CargoBuild::new().package("host-cal").bin("host-cal").current_target();
+    let build = escargot::CargoBuild::new().package("host-cal").bin("host-cal");
     build.run().expect("host-cal builds").path().to_owned()
 });
 

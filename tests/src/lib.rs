@@ -2,4 +2,5 @@
 
 pub mod command;
 pub mod data;
+pub mod experiment;
 pub mod naive;

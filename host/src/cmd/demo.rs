@@ -98,7 +98,7 @@ impl DemoArgs {
         }
         let names = files.iter().map(|(name, _)| self.out.join(name).display().to_string()).collect();
         print(&DemoReport::new(&design, &truth, &fit, &other_poses, names, &self.out), self.output.json)?;
-        Ok(if fit.is_improvement() { Outcome::Good } else { Outcome::Doubtful })
+        Ok(if fit.objection().is_none() { Outcome::Good } else { Outcome::Doubtful })
     }
 
     /// Poses of all pairings as the text of a file: what goes on is what a reader of the file would get.

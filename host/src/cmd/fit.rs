@@ -15,7 +15,9 @@ use super::report::{Report, print, warn};
 use super::table::Columns;
 use super::validate::{PairingLine, ResidualLine, largest, largest_text};
 use crate::files::{Calibration, Dataset, Rig, Robot, write_atomically};
-use crate::identify::{ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, remarks};
+use crate::identify::{
+    ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, plausible_error, remarks,
+};
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// Identify the robot's parameters from measured poses
@@ -148,7 +150,7 @@ impl FitArgs {
         let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, damping })?;
 
         let mut report = FitReport::new(&measured, &fit);
-        let reason = refusal(&fit);
+        let reason = fit.objection();
         if let Some(path) = &self.out {
             match reason {
                 None => {
@@ -164,14 +166,6 @@ impl FitArgs {
         print(&report, self.output.json)?;
         Ok(if reason.is_none() { Outcome::Good } else { Outcome::Doubtful })
     }
-}
-
-/// Why a fit is not worth keeping; `None` when it is.
-fn refusal(fit: &Fit) -> Option<&'static str> {
-    if !fit.solution.status.is_minimum() {
-        return Some(fit.solution.status.explanation());
-    }
-    (!fit.is_improvement()).then_some("poses left out of the fit are predicted no better than by the design")
 }
 
 /// The robot's file with the fitted parameters and a `[calibration]` table.
@@ -226,7 +220,11 @@ impl FitReport {
             outliers: outlier_details.iter().map(|outlier| outlier.row).collect(),
             outlier_details,
             largest: largest(dataset, rig, &fit.residuals_m, 5),
-            remarks: remarks(&robot.chain, dataset, rig, &robot.limits).into_iter().chain(drift_remark(fit)).collect(),
+            remarks: remarks(&robot.chain, dataset, rig, &robot.limits)
+                .into_iter()
+                .chain(runaway_remark(fit))
+                .chain(drift_remark(fit))
+                .collect(),
             warnings: warnings.clone(),
             out: None,
             not_written_because: None,
@@ -263,6 +261,22 @@ impl ParameterLine {
         let held = self.why.as_ref().map(|why| format!("held: {why}")).unwrap_or_default();
         [self.name.clone(), self.unit.to_owned(), number(self.initial), fitted, change, std, held]
     }
+}
+
+/// Parameters that went where no robot's are.
+fn runaway_remark(fit: &Fit) -> Option<String> {
+    const IMPLAUSIBLY_FAR: f64 = 20.0;
+    let far = |parameter: &&FittedParameter| {
+        (parameter.fitted - parameter.initial).abs() > IMPLAUSIBLY_FAR * plausible_error(parameter.unit)
+    };
+    let names: Vec<String> = fit.parameters.iter().filter(far).map(|parameter| parameter.parameter.to_string()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} moved by more than {IMPLAUSIBLY_FAR} times what a design may be off: these poses do not tell them, and no such robot \
+             exists. Hold them, or let --hold auto choose.",
+            names.join(", ")
+        )
+    })
 }
 
 /// What residuals that follow one another mean for the result.

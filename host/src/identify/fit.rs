@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
-use ballbar::{Chain, Damping, FreeParameters, Measurement, Parameter, ParameterUnit};
+use ballbar::{Chain, Damping, FreeParameters, Kinematics, MAX_JOINTS, Measurement, Parameter, ParameterUnit};
 use miette::Diagnostic;
 use thiserror::Error;
 
@@ -104,11 +104,19 @@ impl Fit {
         self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
     }
 
-    /// Whether the result is worth keeping: a minimum was reached, and poses left out of the fit are predicted better than by
-    /// the design (or, where none could be left out, the fitted ones are).
-    pub fn is_improvement(&self) -> bool {
-        let proven_rms_m = self.cross_validation.map_or(self.fitted.rms_m, |held_out| held_out.rms_m);
-        self.solution.status.is_minimum() && proven_rms_m <= self.initial.rms_m
+    /// Why the result is not worth keeping; `None` when it is: a minimum was reached, and poses left out of the fit are
+    /// predicted better by it than by the design.
+    pub fn objection(&self) -> Option<&'static str> {
+        if !self.solution.status.is_minimum() {
+            return Some(self.solution.status.explanation());
+        }
+        match self.cross_validation {
+            None => Some("there are too few poses to leave some out and prove the result on them"),
+            Some(left_out) if left_out.rms_m > self.initial.rms_m => {
+                Some("poses left out of the fit are predicted no better than by the design")
+            }
+            Some(_) => None,
+        }
     }
 }
 
@@ -171,34 +179,36 @@ fn fitted_parameters(
         .collect()
 }
 
-/// Five-fold cross-validation. Rows of the same joint vector stay together: lengths to other spheres of one pose are no
-/// independent proof of it.
+/// Cross-validation in five parts, or in more where five would leave too few poses to fit; `None` where any would. Rows of the
+/// same joint vector stay together: lengths to other spheres of one pose are no independent proof of it.
 fn cross_validate(
     design: &Chain<f64>,
     measurements: &[Measurement<f64>],
     free: &FreeParameters,
     lm: &LmOptions,
 ) -> Option<CrossValidation> {
-    const FOLDS: usize = 5;
-    let mut groups: HashMap<[u64; ballbar::MAX_JOINTS], usize> = HashMap::new();
+    let mut numbers: HashMap<[u64; MAX_JOINTS], usize> = HashMap::new();
     let group_of_row: Vec<usize> = measurements
         .iter()
         .map(|measurement| {
-            let next = groups.len();
-            *groups.entry(measurement.q.as_array().map(f64::to_bits)).or_insert(next)
+            let next = numbers.len();
+            *numbers.entry(measurement.q.as_array().map(f64::to_bits)).or_insert(next)
         })
         .collect();
+    let groups = numbers.len();
+    let part = |folds: usize, fold: usize| -> (Vec<Measurement<f64>>, Vec<Measurement<f64>>) {
+        let rows = measurements.iter().copied().zip(&group_of_row);
+        let (left_out, kept): (Vec<_>, Vec<_>) = rows.partition(|(_, group)| **group % folds == fold);
+        (kept.into_iter().map(|row| row.0).collect(), left_out.into_iter().map(|row| row.0).collect())
+    };
+    let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| part(folds, fold).0.len() > free.len());
+    let folds = [5, 10, groups].into_iter().find(enough)?;
 
     let mut squares = 0.0;
-    for fold in 0..FOLDS {
-        let rows = || measurements.iter().zip(&group_of_row);
-        let kept: Vec<_> = rows().filter(|(_, group)| **group % FOLDS != fold).map(|(m, _)| *m).collect();
-        if kept.len() <= free.len() || groups.len() < FOLDS {
-            return None;
-        }
-        let kinematics = ballbar::Kinematics::new(&solve(design, &kept, free, lm).chain);
-        let left_out = rows().filter(|(_, group)| **group % FOLDS == fold);
-        squares += left_out.map(|(measurement, _)| kinematics.residual(measurement).powi(2)).sum::<f64>();
+    for fold in 0..folds {
+        let (kept, left_out) = part(folds, fold);
+        let kinematics = Kinematics::new(&solve(design, &kept, free, lm).chain);
+        squares += left_out.iter().map(|measurement| kinematics.residual(measurement).powi(2)).sum::<f64>();
     }
-    Some(CrossValidation { folds: FOLDS, rms_m: (squares / measurements.len() as f64).sqrt() })
+    Some(CrossValidation { folds, rms_m: (squares / measurements.len() as f64).sqrt() })
 }

@@ -77,7 +77,7 @@ impl Status {
                 "no length depends on a parameter that is free; measure other poses or hold fewer parameters"
             }
             Self::IterationLimit => {
-                "the steps were used up before a minimum was reached; hold more parameters, or try --damping diagonal"
+                "the steps were used up before a minimum was reached; hold more parameters (--hold auto chooses them)"
             }
             Self::NotFinite => "the residuals at the start are not finite numbers",
         }

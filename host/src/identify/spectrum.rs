@@ -27,6 +27,9 @@ impl Spectrum {
     /// Decomposes a Jacobian (n × k).
     pub fn new(jacobian: &DMatrix<f64>) -> Self {
         let columns = jacobian.ncols();
+        if columns == 0 {
+            return Self { singular_values: Vec::new(), rank: 0, scales: Vec::new(), right: DMatrix::zeros(0, 0) };
+        }
         let scales = column_scales(jacobian);
         let mut scaled = jacobian.clone();
         for (mut column, scale) in scaled.column_iter_mut().zip(&scales) {
