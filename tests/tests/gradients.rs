@@ -9,8 +9,8 @@ use nalgebra::Vector4;
 use num_complex::Complex;
 use proptest::prelude::*;
 
-/// Largest difference allowed, relative to the largest entry or 1. The worst of 200,000 random cases was 3e-13.
-const TOLERANCE: f64 = 1e-11;
+/// Largest difference allowed, relative to the largest entry or 1. The worst of 200,000 random cases was 1.7e-14.
+const TOLERANCE: f64 = 1e-12;
 
 /// What no column can be, so that it shows which entries were written.
 const UNTOUCHED: f64 = -12_345.0;
@@ -184,7 +184,7 @@ proptest! {
         stepped.apply(&step);
         let (after, ..) = cost_and_descent(&stepped, &measurements);
         let gain = (before - after) / (2.0 * t * slope);
-        prop_assert!((gain - 1.0).abs() < 0.02, "{gain} of what the gradient promises");
+        prop_assert!((gain - 1.0).abs() < 1e-3, "{gain} of what the gradient promises");
     }
 
     #[test]

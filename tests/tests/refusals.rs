@@ -275,3 +275,114 @@ fn weights_for_some_poses_only_are_refused() {
     bench.put("weighed.csv", "chuck,sphere,q1_deg,q2_mm,length_mm,sigma_mm\nA,1,10.0,100.0,455.5,0.1\n");
     bench.refuses("sigma_in_the_second_file_only", &[&VALIDATE[..], &["weighed.csv"]].concat());
 }
+
+/// Poses of a PUMA 560 on one pairing's shell, and more rows of poses than parameters from all pairings.
+fn puma_bench() -> Bench {
+    let bench = Bench::new();
+    let simulate = ["simulate", "--robot", "puma560-optimised", "--plan-robot", "puma560", "--rig", "triangles", "--bar", "460"];
+    for (file, more) in [("one.csv", ["--pairings", "A:1", "--per-pair", "12"]), ("all.csv", ["--seed", "3", "--per-pair", "5"])]
+    {
+        let run = host_cal_in(bench.0.path(), &[&simulate[..], &more, &["--out", file]].concat());
+        assert_eq!(run.code, 0, "{}", run.transcript());
+    }
+    bench
+}
+
+#[test]
+fn arguments_that_make_no_sense_are_refused() {
+    const PUMA: [&str; 4] = ["--robot", "puma560", "--rig", "triangles"];
+    let bench = puma_bench();
+    let cases: [(&str, &str, &[&str]); 33] = [
+        ("fit_without_redundancy", "fit", &["one.csv", "--hold", "none", "--out", "old.toml"]),
+        ("fit_of_as_many_poses_as_parameters", "fit", &["one.csv", "--out", "old.toml"]),
+        ("hold_misspelt", "fit", &["all.csv", "--hold", "sclae3"]),
+        ("hold_two_rules", "fit", &["all.csv", "--hold", "auto,none"]),
+        ("hold_a_link_that_is_not_there", "fit", &["all.csv", "--hold", "x9"]),
+        ("hold_a_joint_that_is_not_there", "fit", &["all.csv", "--hold", "auto,scale7"]),
+        ("hold_nothing_said", "fit", &["all.csv", "--hold", ""]),
+        ("damping_unknown", "fit", &["all.csv", "--damping", "marquardt"]),
+        ("no_poses_named", "fit", &[]),
+        ("rank_pairing_of_an_unknown_sphere", "rank", &["all.csv", "--pairings", "A:9"]),
+        ("rank_pairing_of_a_chuck_only", "rank", &["all.csv", "--pairings", "A"]),
+        ("rank_pairing_twice", "rank", &["all.csv", "--pairings", "A:1,A:1"]),
+        ("rank_pairing_with_an_end_comma", "rank", &["all.csv", "--pairings", "A:1,"]),
+        ("rank_pairing_without_poses", "rank", &["one.csv", "--pairings", "B:2,C:3"]),
+        ("validate_limit_of_zero", "validate", &["all.csv", "--max-rms-mm", "0"]),
+        ("validate_limit_below_zero", "validate", &["all.csv", "--max-rms-mm", "-0.1"]),
+        ("validate_limit_of_words", "validate", &["all.csv", "--max-rms-mm", "small"]),
+        ("validate_limit_of_nan", "validate", &["all.csv", "--max-rms-mm", "nan"]),
+        ("simulate_bar_below_zero", "simulate", &["--bar", "-5", "--out", "old.toml"]),
+        ("simulate_bar_below_zero_after_an_equals_sign", "simulate", &["--bar=-5", "--out", "old.toml"]),
+        ("simulate_bar_of_zero", "simulate", &["--bar", "460,0", "--out", "old.toml"]),
+        ("simulate_bar_out_of_reach", "simulate", &["--bar", "5000", "--per-pair", "2", "--out", "old.toml"]),
+        ("simulate_no_poses", "simulate", &["--per-pair", "0", "--out", "old.toml"]),
+        ("simulate_poses_below_zero", "simulate", &["--per-pair", "-3", "--out", "old.toml"]),
+        ("simulate_noise_below_zero", "simulate", &["--sigma-mm", "-1", "--out", "old.toml"]),
+        ("simulate_noise_below_zero_after_an_equals_sign", "simulate", &["--sigma-mm=-1", "--out", "old.toml"]),
+        ("simulate_noise_of_nan", "simulate", &["--sigma-mm", "nan", "--out", "old.toml"]),
+        ("simulate_planned_with_other_joints", "simulate", &["--plan-robot", "scara", "--out", "old.toml"]),
+        ("simulate_pairing_of_an_unknown_chuck", "simulate", &["--pairings", "Z:1", "--out", "old.toml"]),
+        ("robot_neither_file_nor_built_in", "validate", &["all.csv", "--robot", "puma650"]),
+        ("unknown_flag", "rank", &["all.csv", "--jsno"]),
+        ("two_robots_of_poses", "validate", &["all.csv", "poses.csv"]),
+        ("the_same_flag_twice", "validate", &["all.csv", "--max-rms-mm", "1", "--max-rms-mm", "2"]),
+    ];
+    for (name, command, more) in cases {
+        let robot = if more.contains(&"--robot") { &PUMA[2..] } else { &PUMA[..] };
+        bench.refuses(name, &[&[command], robot, more].concat());
+    }
+    let joints: [(&str, &str); 6] = [
+        ("fk_of_too_few_joints", "1,2,3"),
+        ("fk_of_too_many_joints", "1,2,3,4,5,6,7"),
+        ("fk_of_words", "1,2,three,4,5,6"),
+        ("fk_of_nan", "1,2,nan,4,5,6"),
+        ("fk_of_infinity", "1,2,-inf,4,5,6"),
+        ("fk_of_nothing", ""),
+    ];
+    for (name, q) in joints {
+        bench.refuses(name, &["fk", "--robot", "puma560", "--q", q]);
+    }
+    bench.put("barless.toml", RIG.split_once("[bar]").expect("a bar").0);
+    bench.refuses("simulate_without_a_bar", &["simulate", "--robot", "puma560", "--rig", "barless.toml"]);
+    bench.refuses("no_command", &[]);
+    bench.refuses("unknown_command", &["calibrate"]);
+}
+
+#[test]
+fn output_that_cannot_be_written_is_exit_code_3_and_changes_nothing() {
+    let bench = puma_bench();
+    fs::create_dir(bench.0.path().join("folder")).expect("it is not there");
+    let simulate = ["simulate", "--robot", "puma560", "--rig", "triangles", "--bar", "460", "--per-pair", "1", "--out"];
+    let fit = ["fit", "--robot", "puma560", "--rig", "triangles", "all.csv", "--out"];
+    bench.fails(3, "write_poses_to_a_missing_folder", &[&simulate[..], &["missing/poses.csv"]].concat());
+    bench.fails(3, "write_poses_onto_a_folder", &[&simulate[..], &["folder"]].concat());
+    bench.fails(3, "write_a_robot_to_a_missing_folder", &[&fit[..], &["missing/calibrated.toml"]].concat());
+    bench.fails(3, "write_a_robot_below_a_file", &[&fit[..], &["old.toml/calibrated.toml"]].concat());
+    bench.fails(3, "write_a_demo_onto_a_file", &["demo", "--out", "old.toml"]);
+}
+
+#[test]
+fn rows_that_may_be_mistakes_are_warned_of_once_a_kind_and_used() {
+    let bench = Bench::new();
+    let rows = "A,1,10.0,100.0,455.5\nA,1,171.0,100.0,455.5\nB,2,-170.5,600.0,455.5\nB,2,0.0,0.0,530.0\nB,1,30.0,200.0,610.125\n";
+    bench.put("doubtful.csv", format!("{POSES}{rows}"));
+    let many = "A,1,10.0,-0.5,460.0\n".repeat(7);
+    bench.put("many.csv", format!("chuck,sphere,q1_deg,q2_mm,length_mm\n{many}"));
+    let cases: [(&str, &[&str]); 4] = [
+        ("warning_of_each_kind", &["validate", "--robot", "robot.toml", "--rig", "rig.toml", "doubtful.csv"]),
+        ("warning_of_many_rows", &["rank", "--robot", "robot.toml", "--rig", "rig.toml", "many.csv"]),
+        ("warning_of_poses_in_two_files", &["validate", "--robot", "robot.toml", "--rig", "rig.toml", "poses.csv", "poses.csv"]),
+        ("warning_of_fk_beyond_limits", &["fk", "--robot", "robot.toml", "--q", "-180,600"]),
+    ];
+    for (name, args) in cases {
+        let run = host_cal_in(bench.0.path(), args);
+        assert_eq!(run.code, 0, "{}", run.transcript());
+        snapshot(name, args, &run);
+        let json = host_cal_in(bench.0.path(), &[args, &["--json"]].concat());
+        assert_eq!((json.code, &json.stderr), (0, &run.stderr), "the same warnings beside JSON");
+        let listed = json.json()["warnings"]
+            .as_array()
+            .map(|list| list.iter().map(|line| format!("warning: {}\n", line.as_str().expect("text"))).collect::<String>());
+        assert_eq!(listed.unwrap_or_default(), run.stderr, "the document holds the warnings too");
+    }
+}
