@@ -4,17 +4,19 @@
 //! the field, what was found and what was expected. Files are written under a temporary name and renamed.
 
 mod builtin;
-mod error;
+mod numbers;
 mod poses;
+mod problem;
+mod read_poses;
 mod rig;
 mod robot;
 mod source;
 mod write;
 
 pub use builtin::{RIGS, ROBOTS};
-pub use error::{InputError, Problem};
-pub use poses::{Dataset, PairingId, PoseRow, RowWarning, write_poses};
-pub use rig::{Bar, NamedPoint, Rig};
+pub use poses::{Dataset, PoseRow, RowWarning, write_poses};
+pub use problem::Problem;
+pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{Calibration, Coupling, EncoderFacts, JointLimits, Robot};
-pub use source::Source;
+pub use source::{InputError, Source};
 pub use write::{WriteError, write_atomically};

@@ -4,10 +4,10 @@ use ballbar::{Pairing, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::error::{InputError, Problem};
-use super::poses::PairingId;
-use super::source::Source;
-use super::{RIGS, robot};
+use super::builtin::RIGS;
+use super::numbers::{deserialize, finite, positive};
+use super::problem::Problem;
+use super::source::{InputError, Source};
 use crate::units::m_from_mm;
 
 /// A chuck (base frame) or a sphere (tool frame).
@@ -17,6 +17,15 @@ pub struct NamedPoint {
     pub name: String,
     /// Its centre, metres.
     pub position_m: Vector3<f64>,
+}
+
+/// Indices of a chuck and a sphere of a rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PairingId {
+    /// Index into [`Rig::chucks`].
+    pub chuck: usize,
+    /// Index into [`Rig::spheres`].
+    pub sphere: usize,
 }
 
 /// The telescoping bar.
@@ -82,7 +91,7 @@ impl Rig {
     /// # Errors
     /// As [`Rig::open`].
     pub fn parse(source: &Source) -> Result<Self, InputError> {
-        let file: RigToml = robot::deserialize(source)?;
+        let file: RigToml = deserialize(source)?;
         Ok(Self {
             chucks: points(source, "chuck", &file.chucks)?,
             spheres: points(source, "sphere", &file.spheres)?,
@@ -133,7 +142,7 @@ fn points(source: &Source, what: &'static str, points: &[PointToml]) -> Result<V
         }
         let mut position_m = Vector3::zeros();
         for (metres, millimetres) in position_m.iter_mut().zip(&point.position_mm) {
-            *metres = m_from_mm(robot::finite(source, "position_mm", millimetres)?);
+            *metres = m_from_mm(finite(source, "position_mm", millimetres)?);
         }
         named.push(NamedPoint { name: name.clone(), position_m });
     }
@@ -144,9 +153,6 @@ fn read_bar(source: &Source, bar: &BarToml) -> Result<Bar, InputError> {
     if bar.lengths_mm.as_ref().is_empty() {
         return Err(InputError::at(source, bar.lengths_mm.span(), Problem::Empty("bar length")));
     }
-    let lengths = bar.lengths_mm.as_ref().iter().map(|length| robot::positive(source, "lengths_mm", length).map(m_from_mm));
-    Ok(Bar {
-        lengths_m: lengths.collect::<Result<_, _>>()?,
-        travel_m: m_from_mm(robot::positive(source, "travel_mm", &bar.travel_mm)?),
-    })
+    let lengths = bar.lengths_mm.as_ref().iter().map(|length| positive(source, "lengths_mm", length).map(m_from_mm));
+    Ok(Bar { lengths_m: lengths.collect::<Result<_, _>>()?, travel_m: m_from_mm(positive(source, "travel_mm", &bar.travel_mm)?) })
 }

@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml_edit::{DocumentMut, Item, Table, value};
 
-use super::ROBOTS;
-use super::error::{InputError, Problem};
-use super::source::Source;
+use super::builtin::ROBOTS;
+use super::numbers::{deserialize, finite, positive};
+use super::problem::Problem;
+use super::source::{InputError, Source};
 use crate::units::{ScreenUnit, m_from_mm};
 
 /// A robot as its file describes it.
@@ -330,42 +331,6 @@ impl JointReader<'_> {
 
 /// A key of the file and what stands there.
 type Key<'a> = (&'static str, &'a Option<Spanned<f64>>);
-
-/// Reads a TOML text into its serde form.
-pub(super) fn deserialize<T: for<'de> Deserialize<'de>>(source: &Source) -> Result<T, InputError> {
-    toml::from_str(source.text()).map_err(|error| {
-        let problem = Problem::Toml(error.message().replace('\n', ", "));
-        match error.span() {
-            Some(span) => InputError::at(source, span, problem),
-            None => InputError::of_file(source.name(), problem),
-        }
-    })
-}
-
-/// A number that is finite.
-pub(super) fn finite(source: &Source, field: &str, number: &Spanned<f64>) -> Result<f64, InputError> {
-    checked(source, field, number, f64::is_finite, "a finite number")
-}
-
-/// A number that is finite and above zero.
-pub(super) fn positive(source: &Source, field: &str, number: &Spanned<f64>) -> Result<f64, InputError> {
-    checked(source, field, number, |x| x.is_finite() && x > 0.0, "a number above zero")
-}
-
-fn checked(
-    source: &Source,
-    field: &str,
-    number: &Spanned<f64>,
-    is_good: fn(f64) -> bool,
-    expected: &'static str,
-) -> Result<f64, InputError> {
-    let found = *number.as_ref();
-    if is_good(found) {
-        return Ok(found);
-    }
-    let problem = Problem::Number { field: field.to_owned(), found: found.to_string(), expected };
-    Err(InputError::at(source, number.span(), problem))
-}
 
 /// Replaces a number and keeps the comment behind it.
 fn set_number(item: &mut Item, number: f64) {

@@ -1,9 +1,13 @@
-//! The text that a file or a built-in holds, with the name to show for it.
+//! The text that a file or a built-in holds, and what is wrong at some place in it.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::error::{InputError, Problem};
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use thiserror::Error;
+
+use super::problem::Problem;
 
 /// A named text. Cheap to clone.
 #[derive(Clone, Debug)]
@@ -58,5 +62,48 @@ impl Source {
     /// Line number, from 1, of a byte.
     pub fn line_of(&self, byte: usize) -> usize {
         1 + self.text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
+    }
+}
+
+/// A [`Problem`] and where it is.
+#[derive(Debug, Error)]
+#[error("{}: {problem}", .place)]
+pub struct InputError {
+    place: String,
+    problem: Box<Problem>,
+    at: Option<Box<(NamedSource<String>, Range<usize>)>>,
+}
+
+impl InputError {
+    /// A problem of a whole file.
+    pub(super) fn of_file(name: &str, problem: Problem) -> Self {
+        Self { place: name.to_owned(), problem: Box::new(problem), at: None }
+    }
+
+    /// A problem at some bytes of a text.
+    pub(super) fn at(source: &Source, span: Range<usize>, problem: Problem) -> Self {
+        let place = format!("{}:{}", source.name(), source.line_of(span.start));
+        let named = NamedSource::new(source.name(), source.text().to_owned());
+        Self { place, problem: Box::new(problem), at: Some(Box::new((named, span))) }
+    }
+
+    /// What is wrong.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+}
+
+impl Diagnostic for InputError {
+    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
+        self.problem.help().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.at.as_ref().map(|at| &at.0 as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let (_, span) = self.at.as_deref()?;
+        Some(Box::new(std::iter::once(LabeledSpan::underline(span.clone()))))
     }
 }

@@ -1,11 +1,6 @@
 //! What can be wrong with an input file, and what to do about it.
 
-use std::ops::Range;
-
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 use thiserror::Error;
-
-use super::source::Source;
 
 /// What is wrong. Each variant knows what was found and what was expected.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -167,7 +162,8 @@ pub enum Problem {
 }
 
 impl Problem {
-    fn help(&self) -> Option<String> {
+    /// What to do about it.
+    pub(super) fn help(&self) -> Option<String> {
         let help = match self {
             Self::NoSuchFile { what, builtins } => return Some(format!("Give a path, or a built-in {what}: {builtins}.")),
             Self::Unreadable(_) | Self::Csv(_) | Self::FieldCount { .. } => return None,
@@ -188,48 +184,5 @@ impl Problem {
             Self::MixedSigma => "Weights compare poses with one another: give `sigma_mm` for every pose, or for none.",
         };
         Some(help.to_owned())
-    }
-}
-
-/// A [`Problem`] and where it is.
-#[derive(Debug, Error)]
-#[error("{}: {problem}", .place)]
-pub struct InputError {
-    place: String,
-    problem: Box<Problem>,
-    at: Option<Box<(NamedSource<String>, Range<usize>)>>,
-}
-
-impl InputError {
-    /// A problem of a whole file.
-    pub(crate) fn of_file(name: &str, problem: Problem) -> Self {
-        Self { place: name.to_owned(), problem: Box::new(problem), at: None }
-    }
-
-    /// A problem at some bytes of a text.
-    pub(crate) fn at(source: &Source, span: Range<usize>, problem: Problem) -> Self {
-        let place = format!("{}:{}", source.name(), source.line_of(span.start));
-        let named = NamedSource::new(source.name(), source.text().to_owned());
-        Self { place, problem: Box::new(problem), at: Some(Box::new((named, span))) }
-    }
-
-    /// What is wrong.
-    pub fn problem(&self) -> &Problem {
-        &self.problem
-    }
-}
-
-impl Diagnostic for InputError {
-    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
-        self.problem.help().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.at.as_ref().map(|at| &at.0 as &dyn SourceCode)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let (_, span) = self.at.as_deref()?;
-        Some(Box::new(std::iter::once(LabeledSpan::underline(span.clone()))))
     }
 }
