@@ -172,7 +172,7 @@ impl FileReader<'_> {
             set: columns.set.map(|column| record[column].to_owned()),
             t_s: t_s.transpose()?,
             file: self.file,
-            line: self.line(record),
+            line: self.locate(record).0,
         })
     }
 
@@ -209,20 +209,23 @@ impl FileReader<'_> {
         Err(InputError::at(self.source, self.field_span(record, column), problem))
     }
 
-    fn line(&self, record: &StringRecord) -> usize {
-        self.source.line_of(self.line_span(record).start)
+    /// The bytes of a record's line.
+    fn line_span(&self, record: &StringRecord) -> Range<usize> {
+        self.locate(record).1
     }
 
-    /// The bytes of a record's line. The reader's own position is before the comments and empty lines that it skipped.
-    fn line_span(&self, record: &StringRecord) -> Range<usize> {
-        let mut start = record.position().map_or(0, |position| position.byte() as usize);
+    /// Number (from 1) and bytes of a record's line. The reader's own position is before the comments and empty lines that it
+    /// skipped on the way.
+    fn locate(&self, record: &StringRecord) -> (usize, Range<usize>) {
+        let (mut number, mut start) = record.position().map_or((1, 0), |at| (at.line() as usize, at.byte() as usize));
         loop {
             let line = self.source.text()[start..].split('\n').next().unwrap_or_default();
             let skipped = line.trim().is_empty() || line.starts_with('#');
             if !skipped || start + line.len() >= self.source.text().len() {
-                return start..start + line.trim_end().len();
+                return (number, start..start + line.trim_end().len());
             }
             start += line.len() + 1;
+            number += 1;
         }
     }
 

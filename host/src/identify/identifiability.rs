@@ -118,7 +118,7 @@ impl Identifiability {
     /// Judges all parameters of `chain` by the weighted Jacobian at its present values.
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits]) -> Self {
         let rows = measurements.len();
-        let observation = Observation::new(chain, measurements).compressed();
+        let observation = Observation::new(chain, measurements);
         let spectrum = Spectrum::new(&observation.jacobian);
         let independent = independent_columns(chain, &observation.jacobian, spectrum.rank);
         let noise_m = unexplained_rms(&observation, &independent, rows);
@@ -239,7 +239,7 @@ fn reference_jacobian(chain: &Chain<f64>, limits: &[JointLimits]) -> DMatrix<f64
             Some(Measurement { pairing, q, length_m: 0.0, weight: 1.0 })
         })
         .collect();
-    Observation::new(chain, &measurements).compressed().jacobian
+    Observation::new(chain, &measurements).jacobian
 }
 
 /// The most parameters of a chain that so many chucks and spheres can identify: `N − 6 + g(chucks) + g(spheres)`,

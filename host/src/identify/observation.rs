@@ -3,43 +3,42 @@
 use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement};
 use nalgebra::{DMatrix, DVector};
 
-/// `√w J` (n × P, metres per SI unit) and `√w f` (n, metres).
+/// `√w J` and `√w f` of any number of measurements in at most P + 1 rows: the triangle R of `[J f] = Q R`, which has the norms
+/// of all columns and the angles between them. Metres per SI unit, and metres.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// One row a measurement, one column a parameter of the chain, both weighted.
+    /// One column a parameter of the chain.
     pub jacobian: DMatrix<f64>,
-    /// Weighted residuals, measured less computed.
+    /// Residuals, measured less computed, seen from the rows of `jacobian`.
     pub residual_m: DVector<f64>,
 }
 
+/// Measurements that are evaluated before they are reduced: bounds the memory whatever their number.
+const BLOCK: usize = 1024;
+
 impl Observation {
-    /// Evaluates all rows.
+    /// Evaluates all measurements.
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>]) -> Self {
+        let columns = chain.parameter_count();
         let kinematics = Kinematics::new(chain);
-        let count = chain.parameter_count();
-        let mut jacobian = DMatrix::zeros(measurements.len(), count);
-        let mut residual_m = DVector::zeros(measurements.len());
-        let mut row = [0.0; MAX_PARAMETERS];
-        for (i, measurement) in measurements.iter().enumerate() {
-            let root_weight = measurement.weight.sqrt();
-            residual_m[i] = root_weight * kinematics.residual_row(measurement, &mut row);
-            for (entry, &column) in jacobian.row_mut(i).iter_mut().zip(&row) {
-                *entry = root_weight * column;
+        let mut triangle = DMatrix::zeros(0, columns + 1);
+        for block in measurements.chunks(BLOCK) {
+            let above = triangle.nrows();
+            triangle = triangle.resize_vertically(above + block.len(), 0.0);
+            let mut row = [0.0; MAX_PARAMETERS];
+            for (i, measurement) in block.iter().enumerate() {
+                let root_weight = measurement.weight.sqrt();
+                let residual_m = kinematics.residual_row(measurement, &mut row);
+                for (entry, value) in triangle.row_mut(above + i).iter_mut().zip(row[..columns].iter().chain([&residual_m])) {
+                    *entry = root_weight * value;
+                }
+            }
+            if triangle.nrows() > triangle.ncols() {
+                triangle = triangle.qr().r();
             }
         }
-        Self { jacobian, residual_m }
-    }
-
-    /// The same observation in at most P + 1 rows: the triangle R of `[J f] = Q R`. All norms and angles between columns stay.
-    pub fn compressed(self) -> Self {
-        let columns = self.jacobian.ncols();
-        let mut augmented = self.jacobian.insert_column(columns, 0.0);
-        augmented.set_column(columns, &self.residual_m);
-        if augmented.nrows() > augmented.ncols() {
-            augmented = augmented.qr().r();
-        }
-        let residual_m = augmented.column(columns).into_owned();
-        Self { jacobian: augmented.remove_column(columns), residual_m }
+        let residual_m = triangle.column(columns).into_owned();
+        Self { jacobian: triangle.remove_column(columns), residual_m }
     }
 
     /// Only the given columns.

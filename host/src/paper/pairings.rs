@@ -40,7 +40,7 @@ impl PairingRanks {
         for (pairing, measurement) in measurements {
             by_pairing.entry(*pairing).or_default().push(*measurement);
         }
-        let triangles = by_pairing.values().map(|rows| Observation::new(chain, rows).compressed().jacobian).collect();
+        let triangles = by_pairing.values().map(|rows| Observation::new(chain, rows).jacobian).collect();
         Self { pairings: by_pairing.into_keys().collect(), triangles }
     }
 
