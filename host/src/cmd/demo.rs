@@ -10,9 +10,9 @@ use thiserror::Error;
 use super::fit::calibrated_toml;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, progress};
+use super::report::{Report, print, progress, write_file};
 use super::table::Columns;
-use crate::files::{Dataset, RIGS, ROBOTS, Rig, Robot, Source, write_atomically, write_poses};
+use crate::files::{Dataset, RIGS, ROBOTS, Rig, Robot, Source, write_poses};
 use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals_m};
 use crate::simulate::{Shells, tool_error};
 use crate::units::{m_from_mm, mm_from_m};
@@ -94,7 +94,7 @@ impl DemoArgs {
             ("calibrated.toml", calibrated_toml(&design, &fitted_poses, &fit)?),
         ];
         for (name, text) in &files {
-            write_atomically(&self.out.join(name), text)?;
+            write_file(&self.out.join(name), text)?;
         }
         let names = files.iter().map(|(name, _)| self.out.join(name).display().to_string()).collect();
         print(&DemoReport::new(&design, &truth, &fit, &other_poses, names, &self.out), self.output.json)?;

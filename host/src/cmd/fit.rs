@@ -11,10 +11,10 @@ use thiserror::Error;
 use super::inputs::{Measured, MeasuredArgs, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::rank::NotIdentified;
-use super::report::{Report, print, warn};
+use super::report::{Report, print, warn, write_file};
 use super::table::Columns;
 use super::validate::{PairingLine, ResidualLine, largest, largest_text};
-use crate::files::{Calibration, Dataset, Rig, Robot, write_atomically};
+use crate::files::{Calibration, Dataset, Rig, Robot};
 use crate::identify::{
     ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, plausible_error, remarks,
 };
@@ -154,7 +154,7 @@ impl FitArgs {
         if let Some(path) = &self.out {
             match reason {
                 None => {
-                    write_atomically(path, &calibrated_toml(&measured.robot, &measured.dataset, &fit)?)?;
+                    write_file(path, &calibrated_toml(&measured.robot, &measured.dataset, &fit)?)?;
                     report.out = Some(path.display().to_string());
                 }
                 Some(reason) => {

@@ -44,24 +44,20 @@ impl FkArgs {
 
     fn report(&self, robot: &Robot) -> Result<FkReport, CommandError> {
         if let Some(value) = self.q.iter().find(|value| !value.is_finite()) {
-            return Err(CommandError::usage(ListError::Number {
-                flag: "--q",
-                found: value.to_string(),
-                expected: "finite numbers",
-            }));
+            return Err(ListError::Number { flag: "--q", found: value.to_string(), expected: "finite numbers" }.into());
         }
         let kinds = robot.chain.joint_kinds();
         let q: Vec<f64> = self.q.iter().zip(kinds).map(|(&q, &kind)| ScreenUnit::from(kind).to_si(q)).collect();
         let wrong_count = ListError::JointValues { found: self.q.len(), expected: kinds.len() };
         if self.q.len() != kinds.len() {
-            return Err(CommandError::usage(wrong_count));
+            return Err(wrong_count.into());
         }
         for (joint, (limits, &value)) in robot.limits.iter().zip(&q).enumerate() {
             if !limits.contain(value) {
                 warn(&format!("joint {} is beyond its limits", joint + 1));
             }
         }
-        let q = robot.chain.joint_vector(&q).map_err(|_| CommandError::usage(wrong_count))?;
+        let q = robot.chain.joint_vector(&q).map_err(|_| wrong_count)?;
         let base_from_tool = Kinematics::new(&robot.chain).base_from_tool(&q);
         let r = base_from_tool.rotation;
         let angles = [r[(1, 0)].atan2(r[(0, 0)]), (-r[(2, 0)]).atan2(r[(2, 1)].hypot(r[(2, 2)])), r[(2, 1)].atan2(r[(2, 2)])];

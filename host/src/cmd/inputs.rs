@@ -124,11 +124,11 @@ pub(super) fn parse_pairings(text: &str, rig: &Rig) -> Result<Vec<PairingId>, Co
         let Some((chuck, sphere)) = ends else {
             let names =
                 |points: &[crate::files::NamedPoint]| points.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
-            return Err(CommandError::usage(ListError::Pairing(word.to_owned(), names(&rig.chucks), names(&rig.spheres))));
+            return Err(ListError::Pairing(word.to_owned(), names(&rig.chucks), names(&rig.spheres)).into());
         };
         let pairing = PairingId { chuck, sphere };
         if pairings.contains(&pairing) {
-            return Err(CommandError::usage(ListError::RepeatedPairing(word.to_owned())));
+            return Err(ListError::RepeatedPairing(word.to_owned()).into());
         }
         pairings.push(pairing);
     }

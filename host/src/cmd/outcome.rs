@@ -4,10 +4,6 @@ use std::process::ExitCode;
 
 use miette::{Diagnostic, Report};
 
-use crate::files::{InputError, WriteError};
-use crate::identify::{FitError, HoldError};
-use crate::simulate::ShellError;
-
 /// How a command that ran to its end ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -36,43 +32,15 @@ pub struct CommandError {
 }
 
 impl CommandError {
-    /// Bad input or usage.
-    pub(super) fn usage(diagnostic: impl Diagnostic + Send + Sync + 'static) -> Self {
-        Self { report: Report::new(diagnostic), exit_code: 2 }
-    }
-
     /// Output that could not be written.
     pub(super) fn output(diagnostic: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self { report: Report::new(diagnostic), exit_code: 3 }
     }
 }
 
-impl From<InputError> for CommandError {
-    fn from(error: InputError) -> Self {
-        Self::usage(error)
-    }
-}
-
-impl From<FitError> for CommandError {
-    fn from(error: FitError) -> Self {
-        Self::usage(error)
-    }
-}
-
-impl From<HoldError> for CommandError {
-    fn from(error: HoldError) -> Self {
-        Self::usage(error)
-    }
-}
-
-impl From<ShellError> for CommandError {
-    fn from(error: ShellError) -> Self {
-        Self::usage(error)
-    }
-}
-
-impl From<WriteError> for CommandError {
-    fn from(error: WriteError) -> Self {
-        Self::output(error)
+/// What a command meets on its way is bad input, unless it says otherwise.
+impl<E: Diagnostic + Send + Sync + 'static> From<E> for CommandError {
+    fn from(error: E) -> Self {
+        Self { report: Report::new(error), exit_code: 2 }
     }
 }

@@ -86,7 +86,7 @@ impl PaperArgs {
             bar.set_position(done as u64);
         });
         bar.finish_and_clear();
-        let report = PaperReport::new(self.seed, &experiment.map_err(CommandError::usage)?)?;
+        let report = PaperReport::new(self.seed, &experiment?)?;
         print(&report, self.output.json)?;
         Ok(Outcome::Good)
     }

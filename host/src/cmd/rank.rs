@@ -67,7 +67,7 @@ impl RankArgs {
             let pairings = parse_pairings(list, &measured.rig)?;
             measured.dataset.rows.retain(|row| pairings.contains(&row.pairing));
             if measured.dataset.rows.is_empty() {
-                return Err(CommandError::usage(ListError::NoPoseLeft(list.clone())));
+                return Err(ListError::NoPoseLeft(list.clone()).into());
             }
         }
         print(&report(measured), self.output.json)?;

@@ -1,6 +1,7 @@
 //! What a command found, for people and for machines, from one place.
 
 use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{Diagnostic, Report as MietteReport};
@@ -8,6 +9,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::outcome::CommandError;
+use crate::files::write_atomically;
 
 /// A result that can be shown as text and as JSON.
 pub(super) trait Report: Serialize {
@@ -33,6 +35,11 @@ pub(super) fn print(report: &impl Report, json: bool) -> Result<(), CommandError
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(CommandError::output(PrintError(error.to_string()))),
         _ => Ok(()),
     }
+}
+
+/// Writes a file by rename.
+pub(super) fn write_file(path: &Path, contents: &str) -> Result<(), CommandError> {
+    write_atomically(path, contents).map_err(CommandError::output)
 }
 
 /// Says something that is no result and no error.

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::inputs::{ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, progress};
-use crate::files::{PairingId, PoseRow, Rig, Robot, write_atomically, write_poses};
+use super::report::{Report, print, progress, write_file};
+use crate::files::{PairingId, PoseRow, Rig, Robot, write_poses};
 use crate::simulate::{ShellPose, Shells};
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
 
@@ -90,7 +90,7 @@ impl SimulateArgs {
         let rig = Rig::open(&self.rig)?;
         let report = self.simulate(&truth, &planned_with, &rig)?;
         if let Some(path) = &self.out {
-            write_atomically(path, &report.csv)?;
+            write_file(path, &report.csv)?;
         }
         print(&report, self.output.json)?;
         Ok(Outcome::Good)
@@ -137,12 +137,12 @@ impl SimulateArgs {
         if !self.bar.is_empty() {
             return Ok(self.bar.clone());
         }
-        let bar = rig.bar.as_ref().ok_or_else(|| CommandError::usage(ListError::NoBar))?;
+        let bar = rig.bar.as_ref().ok_or(ListError::NoBar)?;
         Ok(bar.lengths_m.iter().map(|&m| mm_from_m(m)).collect())
     }
 
     fn check(&self, truth: &Robot, planned_with: &Robot) -> Result<(), CommandError> {
-        let refuse = |flag, found: String, expected| Err(CommandError::usage(ListError::Number { flag, found, expected }));
+        let refuse = |flag, found: String, expected| Err(ListError::Number { flag, found, expected }.into());
         if let Some(bar) = self.bar.iter().find(|&&mm| !(mm.is_finite() && mm > 0.0)) {
             return refuse("--bar", bar.to_string(), "a number above zero");
         }

@@ -101,7 +101,7 @@ impl ValidateArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         if let Some(limit) = self.max_rms_mm.filter(|&limit| limit.is_nan() || limit <= 0.0) {
             let found = limit.to_string();
-            return Err(CommandError::usage(ListError::Number { flag: "--max-rms-mm", found, expected: "a number above zero" }));
+            return Err(ListError::Number { flag: "--max-rms-mm", found, expected: "a number above zero" }.into());
         }
         let measured = self.measured.read()?;
         let report = self.report(measured);
