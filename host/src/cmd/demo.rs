@@ -7,10 +7,9 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::fit::calibrated_toml;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, progress, write_file};
+use super::report::{Report, print, progress, write_calibrated, write_file};
 use super::table::Columns;
 use crate::files::{Dataset, RIGS, ROBOTS, Rig, Robot, Source, write_poses};
 use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals_m};
@@ -91,12 +90,14 @@ impl DemoArgs {
             ("rig.toml", builtin(&RIGS, "triangles")),
             (fitted_name, fitted_csv),
             (other_name, other_csv),
-            ("calibrated.toml", calibrated_toml(&design, &fitted_poses, &fit)?),
         ];
         for (name, text) in &files {
             write_file(&self.out.join(name), text)?;
         }
-        let names = files.iter().map(|(name, _)| self.out.join(name).display().to_string()).collect();
+        let calibrated_name = "calibrated.toml";
+        write_calibrated(&self.out.join(calibrated_name), &design, &fitted_poses, &fit)?;
+        let names = files.iter().map(|(name, _)| *name).chain([calibrated_name]);
+        let names = names.map(|name| self.out.join(name).display().to_string()).collect();
         print(&DemoReport::new(&design, &truth, &fit, &other_poses, names, &self.out), self.output.json)?;
         Ok(if fit.objection().is_none() { Outcome::Good } else { Outcome::Doubtful })
     }

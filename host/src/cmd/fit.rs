@@ -4,17 +4,14 @@ use std::path::PathBuf;
 
 use ballbar::Damping;
 use clap::{Args, ValueEnum};
-use miette::Diagnostic;
 use serde::Serialize;
-use thiserror::Error;
 
 use super::inputs::{Measured, MeasuredArgs, OutputArgs};
+use super::lines::{NotIdentified, PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
-use super::rank::NotIdentified;
-use super::report::{Report, print, warn, write_file};
+use super::report::{Report, print, warn, write_calibrated};
 use super::table::Columns;
-use super::validate::{PairingLine, ResidualLine, largest, largest_text};
-use crate::files::{Calibration, Dataset, Rig, Robot};
+use crate::files::{Dataset, Rig};
 use crate::identify::{
     ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, plausible_error, remarks,
 };
@@ -55,10 +52,6 @@ enum DampingArg {
     Identity,
     Diagonal,
 }
-
-#[derive(Debug, Error, Diagnostic)]
-#[error("the robot file cannot be rewritten: {0}")]
-struct RewriteError(String);
 
 /// What `fit --json` prints.
 #[derive(Serialize)]
@@ -154,7 +147,7 @@ impl FitArgs {
         if let Some(path) = &self.out {
             match reason {
                 None => {
-                    write_file(path, &calibrated_toml(&measured.robot, &measured.dataset, &fit)?)?;
+                    write_calibrated(path, &measured.robot, &measured.dataset, &fit)?;
                     report.out = Some(path.display().to_string());
                 }
                 Some(reason) => {
@@ -166,23 +159,6 @@ impl FitArgs {
         print(&report, self.output.json)?;
         Ok(if reason.is_none() { Outcome::Good } else { Outcome::Doubtful })
     }
-}
-
-/// The robot's file with the fitted parameters and a `[calibration]` table.
-pub(super) fn calibrated_toml(robot: &Robot, dataset: &Dataset, fit: &Fit) -> Result<String, CommandError> {
-    let calibration = Calibration {
-        when: jiff::Timestamp::now().round(jiff::Unit::Second).unwrap_or_else(|_| jiff::Timestamp::now()).to_string(),
-        by: concat!("host-cal ", env!("CARGO_PKG_VERSION")).to_owned(),
-        from_robot: robot.source_name().to_owned(),
-        from_poses: dataset.files.clone(),
-        poses: dataset.rows.len(),
-        free_parameters: fit.free_parameters(),
-        rms_initial_mm: mm_from_m(fit.initial.rms_m),
-        rms_mm: mm_from_m(fit.fitted.rms_m),
-        held_out_rms_mm: fit.cross_validation.map(|held_out| mm_from_m(held_out.rms_m)),
-    };
-    let text = robot.calibrated_toml(&fit.solution.chain, &calibration);
-    text.map_err(|error| CommandError::output(RewriteError(error.to_string())))
 }
 
 impl FitReport {

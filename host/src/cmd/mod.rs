@@ -7,6 +7,7 @@ mod demo;
 mod fit;
 mod fk;
 mod inputs;
+mod lines;
 mod outcome;
 mod paper;
 mod rank;

@@ -4,10 +4,11 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs, parse_pairings};
+use super::lines::NotIdentified;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
 use super::table::Columns;
-use crate::identify::{Finding, Identifiability, bound_by_pairings, remarks};
+use crate::identify::{Identifiability, bound_by_pairings, remarks};
 
 /// How many parameters these poses can identify, and which they cannot
 #[derive(Args)]
@@ -39,25 +40,6 @@ struct RankReport {
     not_identified: Vec<NotIdentified>,
     remarks: Vec<String>,
     warnings: Vec<String>,
-}
-
-/// A parameter that the poses do not identify.
-#[derive(Serialize)]
-pub(super) struct NotIdentified {
-    pub(super) name: String,
-    pub(super) kind: &'static str,
-    pub(super) why: String,
-}
-
-impl NotIdentified {
-    pub(super) fn all(found: &Identifiability) -> Vec<Self> {
-        let line = |(parameter, finding): (ballbar::Parameter, &Finding)| Self {
-            name: parameter.to_string(),
-            kind: finding.kind(),
-            why: finding.to_string(),
-        };
-        found.not_identified().map(line).collect()
-    }
 }
 
 impl RankArgs {

@@ -9,7 +9,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::outcome::CommandError;
-use crate::files::write_atomically;
+use crate::files::{Dataset, Robot, write_atomically};
+use crate::identify::Fit;
 
 /// A result that can be shown as text and as JSON.
 pub(super) trait Report: Serialize {
@@ -40,6 +41,17 @@ pub(super) fn print(report: &impl Report, json: bool) -> Result<(), CommandError
 /// Writes a file by rename.
 pub(super) fn write_file(path: &Path, contents: &str) -> Result<(), CommandError> {
     write_atomically(path, contents).map_err(CommandError::output)
+}
+
+#[derive(Debug, Error, Diagnostic)]
+#[error("{0}: the robot's text cannot be edited: {1}")]
+struct EditError(String, String);
+
+/// Writes the robot's file with the fitted parameters and a `[calibration]` table.
+pub(super) fn write_calibrated(path: &Path, robot: &Robot, dataset: &Dataset, fit: &Fit) -> Result<(), CommandError> {
+    let text = robot.calibrated_toml(&fit.solution.chain, &fit.calibration(robot, dataset));
+    let broken = |error: toml_edit::TomlError| CommandError::output(EditError(robot.source_name().to_owned(), error.to_string()));
+    write_file(path, &text.map_err(broken)?)
 }
 
 /// Says something that is no result and no error.

@@ -4,11 +4,11 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs};
+use super::lines::{PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
 use super::table::Columns;
-use crate::files::{Dataset, Rig};
-use crate::identify::{PairingResiduals, ResidualSummary, by_pairing, residuals_m};
+use crate::identify::{ResidualSummary, by_pairing, residuals_m};
 use crate::units::mm_from_m;
 
 /// Residuals on poses that the fit has not seen
@@ -39,62 +39,6 @@ struct ValidateReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     within_max_rms: Option<bool>,
     warnings: Vec<String>,
-}
-
-/// Residuals of one pairing, for tables and JSON.
-#[derive(Serialize)]
-pub(super) struct PairingLine {
-    pub(super) pairing: String,
-    pub(super) poses: usize,
-    pub(super) rms_mm: f64,
-    pub(super) mean_mm: f64,
-    pub(super) max_abs_mm: f64,
-}
-
-impl PairingLine {
-    pub(super) fn new(rig: &Rig, residuals: &PairingResiduals) -> Self {
-        let PairingResiduals { pairing, summary } = residuals;
-        Self {
-            pairing: rig.pairing_name(*pairing),
-            poses: summary.count,
-            rms_mm: mm_from_m(summary.rms_m),
-            mean_mm: mm_from_m(summary.mean_m),
-            max_abs_mm: mm_from_m(summary.max_abs_m),
-        }
-    }
-}
-
-/// One row's residual.
-#[derive(Serialize)]
-pub(super) struct ResidualLine {
-    /// From 1, over all files.
-    pub(super) row: usize,
-    /// File and line.
-    pub(super) place: String,
-    pub(super) pairing: String,
-    pub(super) residual_mm: f64,
-}
-
-/// The rows with the largest residuals, the worst first.
-pub(super) fn largest(dataset: &Dataset, rig: &Rig, residuals_m: &[f64], count: usize) -> Vec<ResidualLine> {
-    let mut order: Vec<usize> = (0..residuals_m.len()).collect();
-    order.sort_by(|&a, &b| residuals_m[b].abs().total_cmp(&residuals_m[a].abs()));
-    let line = |&row: &usize| ResidualLine {
-        row: row + 1,
-        place: dataset.place(row),
-        pairing: rig.pairing_name(dataset.rows[row].pairing),
-        residual_mm: mm_from_m(residuals_m[row]),
-    };
-    order.iter().take(count).map(line).collect()
-}
-
-/// A table of the largest residuals.
-pub(super) fn largest_text(lines: &[ResidualLine]) -> String {
-    let mut table = Columns::new(&["row", "<at", "<pairing", "residual mm"]);
-    for line in lines {
-        table.row([line.row.to_string(), line.place.clone(), line.pairing.clone(), format!("{:.4}", line.residual_mm)]);
-    }
-    table.text()
 }
 
 impl ValidateArgs {

@@ -12,7 +12,8 @@ use super::identifiability::Identifiability;
 use super::lm::{LmOptions, Solution, solve};
 use super::residuals::{Outlier, PairingResiduals, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals_m};
 use super::uncertainty::Uncertainty;
-use crate::files::{Dataset, Robot};
+use crate::files::{Calibration, Dataset, Robot};
+use crate::units::mm_from_m;
 
 /// What to hold, and how to step.
 #[derive(Clone, Debug, Default)]
@@ -116,6 +117,22 @@ impl Fit {
                 Some("poses left out of the fit are predicted no better than by the design")
             }
             Some(_) => None,
+        }
+    }
+
+    /// What a calibrated robot's file says of this fit, dated now.
+    pub fn calibration(&self, robot: &Robot, dataset: &Dataset) -> Calibration {
+        let now = jiff::Timestamp::now();
+        Calibration {
+            when: now.round(jiff::Unit::Second).unwrap_or(now).to_string(),
+            by: concat!("host-cal ", env!("CARGO_PKG_VERSION")).to_owned(),
+            from_robot: robot.source_name().to_owned(),
+            from_poses: dataset.files.clone(),
+            poses: dataset.rows.len(),
+            free_parameters: self.free_parameters(),
+            rms_initial_mm: mm_from_m(self.initial.rms_m),
+            rms_mm: mm_from_m(self.fitted.rms_m),
+            held_out_rms_mm: self.cross_validation.map(|held_out| mm_from_m(held_out.rms_m)),
         }
     }
 }

@@ -9,6 +9,7 @@
 //!
 //! `docs/identification.md` says how each decision is made and why.
 
+mod advice;
 mod fit;
 mod hold;
 mod identifiability;
@@ -20,11 +21,10 @@ mod residuals;
 mod spectrum;
 mod uncertainty;
 
+pub use advice::{bound_by_ends, bound_by_pairings, remarks};
 pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, fit};
 pub use hold::{Hold, HoldError};
-pub use identifiability::{
-    Finding, Identifiability, PLAUSIBLE_ERROR, bound_by_ends, bound_by_pairings, plausible_error, remarks,
-};
+pub use identifiability::{Finding, Identifiability, PLAUSIBLE_ERROR, plausible_error};
 pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
 pub use normality::{AndersonDarling, anderson_darling};
 pub use observation::Observation;
