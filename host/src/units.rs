@@ -12,6 +12,11 @@ pub fn mm_from_m(m: f64) -> f64 {
     m * 1e3
 }
 
+/// A number from a file without the digits that the way through SI has added: rounded at the ninth decimal.
+pub fn tidy(value: f64) -> f64 {
+    (value * 1e9).round() / 1e9
+}
+
 /// A unit as files and screens have it, and its size in SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ScreenUnit {

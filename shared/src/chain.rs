@@ -169,7 +169,7 @@ impl<S: Real> Chain<S> {
         &mut self.parameters[..count]
     }
 
-    /// Unit of the parameter at `index`.
+    /// Unit of a parameter's value.
     pub fn unit(&self, parameter: Parameter) -> ParameterUnit {
         let joint = self.kinds.get(parameter.number() - 1).copied().unwrap_or(JointKind::Revolute);
         parameter.kind().unit(joint)

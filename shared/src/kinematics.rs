@@ -3,7 +3,9 @@
 //! No 4×4 products and no numerical differences. One sweep from the tool to the base carries the sphere; one sweep from the
 //! base to the tool carries the wrench of a unit force along the bar, and each parameter's column is one component of it.
 
-use crate::{Chain, JointKind, JointVector, MAX_JOINTS, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Real, Row, Vector3};
+use crate::{
+    Chain, Joint, JointKind, JointVector, Link, MAX_JOINTS, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Real, Row, Vector3,
+};
 
 /// Where the bar's two ends are: a chuck on the table and a sphere on the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +43,7 @@ pub struct Pose<S> {
 pub struct Kinematics<S> {
     joints: usize,
     links: [LinkGeometry<S>; MAX_JOINTS + 1],
-    encoders: [Encoder<S>; MAX_JOINTS],
+    encoders: [Joint<S>; MAX_JOINTS],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -51,13 +53,6 @@ struct LinkGeometry<S> {
     rotation: Matrix3<S>,
     sin_alpha: S,
     cos_alpha: S,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Encoder<S> {
-    kind: JointKind,
-    offset: S,
-    scale: S,
 }
 
 /// What a joint does at one pose.
@@ -76,10 +71,10 @@ impl<S: Real> Kinematics<S> {
                 *geometry = LinkGeometry::new(link);
             }
         }
-        let mut encoders = [Encoder { kind: JointKind::Revolute, offset: S::zero(), scale: S::zero() }; MAX_JOINTS];
+        let mut encoders = [Joint { kind: JointKind::Revolute, offset: S::zero(), scale: S::zero() }; MAX_JOINTS];
         for (i, encoder) in encoders.iter_mut().enumerate() {
             if let Some(joint) = chain.joint(i) {
-                *encoder = Encoder { kind: joint.kind, offset: joint.offset, scale: joint.scale };
+                *encoder = joint;
             }
         }
         Self { joints: chain.joints(), links, encoders }
@@ -145,7 +140,7 @@ impl<S: Real> Kinematics<S> {
     fn motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
         let mut motions = [Motion::Slide { distance_m: S::zero() }; MAX_JOINTS];
         for ((motion, encoder), q) in motions.iter_mut().zip(&self.encoders[..self.joints]).zip(&q.0) {
-            *motion = encoder.motion(*q);
+            *motion = Motion::new(encoder, *q);
         }
         motions
     }
@@ -196,7 +191,7 @@ impl<S: Real> Kinematics<S> {
 }
 
 impl<S: Real> LinkGeometry<S> {
-    fn new(link: crate::Link<S>) -> Self {
+    fn new(link: Link<S>) -> Self {
         let (sa, ca) = link.alpha_rad.sine_cosine();
         let (sb, cb) = link.beta_rad.sine_cosine();
         let (sg, cg) = link.gamma_rad.sine_cosine();
@@ -224,20 +219,19 @@ impl<S: Real> LinkGeometry<S> {
     }
 }
 
-impl<S: Real> Encoder<S> {
-    fn motion(&self, q: S) -> Motion<S> {
-        let theta = self.offset + self.scale * q;
-        match self.kind {
+impl<S: Real> Motion<S> {
+    /// What a joint does at encoder output `q`.
+    fn new(joint: &Joint<S>, q: S) -> Self {
+        let theta = joint.offset + joint.scale * q;
+        match joint.kind {
             JointKind::Revolute => {
                 let (sin, cos) = theta.sine_cosine();
-                Motion::Turn { sin, cos }
+                Self::Turn { sin, cos }
             }
-            JointKind::Prismatic => Motion::Slide { distance_m: theta },
+            JointKind::Prismatic => Self::Slide { distance_m: theta },
         }
     }
-}
 
-impl<S: Real> Motion<S> {
     /// A direction behind the joint, seen from before it.
     fn direction(&self, v: Vector3<S>) -> Vector3<S> {
         match *self {

@@ -9,7 +9,7 @@
 //! new parameters ◀──Chain::apply── Step ◀──DampedSolver::solve(λ)── JᵀWJ, JᵀWf
 //! ```
 //!
-//! Units are SI throughout: metres, radians, newton-free wrenches (a unit force along the bar). Frames stand in the names:
+//! Units are SI throughout: metres, radians, and wrenches of a dimensionless unit force along the bar. Frames stand in the names:
 //! `base_from_tool` maps tool coordinates to base coordinates. Everything is generic over [`Real`], `f32` or `f64`; nothing
 //! allocates, nothing panics on bad numbers, and sizes are set at run time under [`MAX_JOINTS`].
 #![no_std]
@@ -45,5 +45,5 @@ pub const PARAMETERS_OF_LAST_LINK: usize = 6;
 /// The most parameters that a chain may have: 8·J + 6.
 pub const MAX_PARAMETERS: usize = PARAMETERS_PER_JOINT * MAX_JOINTS + PARAMETERS_OF_LAST_LINK;
 
-/// One value for each parameter of a chain, in parameter order; entries beyond the chain's own count are zero.
+/// One value for each parameter of a chain, in parameter order; entries beyond the chain's own count mean nothing.
 pub type Row<S> = [S; MAX_PARAMETERS];

@@ -49,6 +49,11 @@ impl FreeParameters {
         Ok(Self(free))
     }
 
+    /// Those of the first `count` parameters whose index `is_free` admits.
+    pub fn filtered(count: usize, is_free: impl Fn(usize) -> bool) -> Self {
+        Self((0..count.min(MAX_PARAMETERS)).filter(|&index| is_free(index)).map(|index| index as u8).collect())
+    }
+
     /// How many there are.
     pub fn len(&self) -> usize {
         self.0.len()

@@ -88,7 +88,9 @@ impl<S: Real> DampedSolver<S> {
 
     /// `λD`, and the scale of each column.
     fn set_damping(&mut self, normal: &NormalEquations<S>, lambda: S, damping: Damping) {
-        let largest = normal.diagonal().fold(S::zero(), |a, b| a.max(b));
+        // A translation column has unit rows, so the sum of weights is the size that a column of substance has, even when
+        // every free column is rounding.
+        let largest = normal.diagonal().fold(normal.weight(), |a, b| a.max(b));
         let hundred_ulps = S::nearest(100.0) * S::EPSILON;
         let zero_column = hundred_ulps * hundred_ulps * largest;
         for (i, square) in normal.diagonal().enumerate() {

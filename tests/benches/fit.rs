@@ -93,7 +93,7 @@ fn fits(criterion: &mut Criterion) {
     }
     group.finish();
     criterion.bench_function("what 810 poses identify", |bencher| {
-        bencher.iter(|| Identifiability::new(chain, &measurements, &puma.design.limits));
+        bencher.iter(|| Identifiability::new(chain, &measurements, &puma.design.limits, &[]));
     });
 }
 

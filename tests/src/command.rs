@@ -36,7 +36,13 @@ impl Run {
 
 /// Runs `host-cal` in a folder.
 pub fn host_cal_in(folder: &Path, args: &[&str]) -> Run {
-    let output = Command::new(&*HOST_CAL).args(args).current_dir(folder).env("NO_COLOR", "1").output().expect("host-cal starts");
+    let output = Command::new(&*HOST_CAL)
+        .args(args)
+        .current_dir(folder)
+        .env("NO_COLOR", "1")
+        .env_remove("COLUMNS")
+        .output()
+        .expect("host-cal starts");
     let text = |bytes| String::from_utf8(bytes).expect("host-cal prints UTF-8");
     Run { code: output.status.code().expect("host-cal ends by itself"), stdout: text(output.stdout), stderr: text(output.stderr) }
 }

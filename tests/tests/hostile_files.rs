@@ -166,7 +166,6 @@ fn a_mutant_of_poses_is_refused_or_has_sound_rows_that_can_be_written_and_read_a
                 .iter()
                 .all(|(row, warning)| *row < dataset.rows.len() && !warning.to_string().is_empty())
         );
-        // A `set` that needs quotes is not written with them: see the ignored test below.
         let plain = |set: &String| !set.contains([',', '"', '\n', '\r']);
         if dataset.rows.iter().all(|row| row.set.as_ref().is_none_or(plain)) {
             let text = write_poses(&robot, &rig, &dataset.rows);
@@ -196,7 +195,6 @@ fn the_command_shows_what_is_wrong_with_a_mutant_without_a_panic() {
 }
 
 #[test]
-#[ignore = "BUG: a `set` with a comma, a quote or a line break is written without quotes"]
 fn a_set_that_needs_quotes_is_written_with_them() {
     let (robot, rig) = good();
     for set in ["left, then right", "the \"second\" one", "# 2"] {
@@ -213,7 +211,6 @@ fn a_set_that_needs_quotes_is_written_with_them() {
 }
 
 #[test]
-#[ignore = "BUG: 1/sigma^2 overflows, weights become NaN, and `fit` and `rank` never end"]
 fn weights_stay_finite_however_small_or_large_sigma_is() {
     let (robot, rig) = good();
     for sigma in ["1e-200", "1e-160", "1e200"] {

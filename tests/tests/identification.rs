@@ -4,7 +4,7 @@ use ballbar::{Chain, Damping, FreeParameters, JointKind, Kinematics, Parameter};
 use ballbar_tests::experiment::{Puma, worst_parameter_difference};
 use host_cal::files::Dataset;
 use host_cal::identify::{
-    Finding, Fit, FitError, FitOptions, Hold, LmOptions, OutlierTest, ResidualSummary, Status, fit, residuals_m, solve,
+    Finding, Fit, FitError, FitOptions, Hold, LmOptions, OutlierTest, ResidualSummary, Status, fit, residuals, solve,
 };
 use host_cal::simulate::tool_error;
 
@@ -28,7 +28,7 @@ fn table_ii_is_recovered_from_noisy_lengths_and_proves_itself_on_the_other_radiu
         assert!(matches!(result.solution.status, Status::Converged(_)) && result.objection().is_none());
 
         let other = puma.shells(0.61, 90, SIGMA_M, seed + 1000);
-        let other_mm = ResidualSummary::new(&residuals_m(&result.solution.chain, &other)).rms_m * 1e3;
+        let other_mm = ResidualSummary::new(&residuals(&result.solution.chain, &other)).rms_m * 1e3;
         assert!(other_mm < 0.10, "seed {seed}: {other_mm} on the other shells");
 
         let tool = |chain: &Chain<f64>| tool_error(&puma.truth.chain, chain, &puma.truth.limits, 3000, 1).rms_m * 1e3;
@@ -232,4 +232,34 @@ fn heavy_noise_on_few_poses_is_not_an_improvement() {
     let poses = puma.shells(0.46, 5, 1e-3, 8);
     let result = fit(&robot, &poses, &hold("paper")).unwrap();
     assert!(result.solution.status.is_minimum() && result.objection().is_some());
+}
+
+#[test]
+fn a_subset_is_chosen_around_parameters_held_by_name() {
+    let puma = Puma::default();
+    let poses = puma.shells(0.46, 20, SIGMA_M, 7);
+    let auto = fit_puma(&puma, &poses, &FitOptions::default());
+    for names in ["alpha1", "alpha1,z1"] {
+        let around = fit_puma(&puma, &poses, &hold(&format!("auto,{names}")));
+        assert_eq!(around.free_parameters(), 36, "{names}");
+        assert!((around.fitted.rms_m - auto.fitted.rms_m).abs() < 1e-11, "{names}: {:e}", around.fitted.rms_m);
+    }
+    let scale = fit_puma(&puma, &poses, &hold("auto,scale3"));
+    assert_eq!(scale.free_parameters(), 35, "nothing stands in for a scale");
+    assert!(scale.identifiability.not_identified().all(|(parameter, _)| parameter.to_string() != "scale3"));
+}
+
+#[test]
+fn free_columns_of_rounding_only_are_no_columns() {
+    // The sphere at the origin of the last frame of a chain whose numbers are all odd: its turns change no length but by rounding.
+    let puma = Puma::default();
+    let mut measurements = puma.shells(0.46, 20, SIGMA_M, 7).measurements();
+    for measurement in &mut measurements {
+        measurement.pairing.sphere_tool_m = ballbar::Vector3::zeros();
+    }
+    let of = |name: &str| name.parse::<Parameter>().unwrap().index();
+    let free = FreeParameters::from_indices(["alpha7", "beta7", "gamma7"].map(of)).unwrap();
+    let solution = solve(&puma.truth.chain, &measurements, &free, &LmOptions::default());
+    assert_eq!(solution.status, Status::NothingObservable);
+    assert_eq!(solution.chain, puma.truth.chain);
 }

@@ -53,7 +53,7 @@ proptest! {
         q in prop::collection::vec(prop::array::uniform8(-2.5..2.5_f64), 180),
     ) {
         let limits = vec![JointLimits { min: -2.5, max: 2.5 }; chain.joints()];
-        let found = Identifiability::new(&chain, &measurements(&chain, &chucks, &spheres, &q), &limits);
+        let found = Identifiability::new(&chain, &measurements(&chain, &chucks, &spheres, &q), &limits, &[]);
         prop_assert_eq!(found.spectrum.rank, chain.independent_parameters());
         let (last, first) = found.spectrum.gap().unwrap();
         prop_assert!(last > 1e6 * first, "a visible gap: {:e} {:e}", last, first);
@@ -73,7 +73,7 @@ proptest! {
         used in (1..=3_usize, 1..=3_usize),
         q in prop::collection::vec(prop::array::uniform8(-2.5..2.5_f64), 180),
     ) {
-        // The rule holds where the sphere can be anywhere about the chuck: with four joints or more, the first and last turning.
+        // The rule is a bound that is met where the tool can be turned and moved enough: with four revolute joints or more.
         let kinds = chain.joint_kinds();
         prop_assume!(kinds.iter().filter(|&&kind| kind == JointKind::Revolute).count() >= 4);
         let rows = measurements(&chain, &chucks[..used.0], &spheres[..used.1], &q);

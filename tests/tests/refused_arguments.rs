@@ -89,7 +89,6 @@ fn output_that_cannot_be_written_is_exit_code_3_and_changes_nothing() {
 }
 
 #[test]
-#[ignore = "BUG: clap takes -5 for a flag: `unexpected argument '-5' found`"]
 fn a_number_below_zero_is_refused_as_a_number() {
     const PUMA: [&str; 4] = ["--robot", "puma560", "--rig", "triangles"];
     let bench = Bench::new();
@@ -106,7 +105,6 @@ fn a_number_below_zero_is_refused_as_a_number() {
 }
 
 #[test]
-#[ignore = "BUG: `attempt to multiply with overflow` in simulate.rs and shells.rs"]
 fn more_poses_than_a_computer_can_count_are_refused() {
     let bench = Bench::new();
     for count in ["50000000000000000", "18446744073709551615"] {
@@ -116,7 +114,6 @@ fn more_poses_than_a_computer_can_count_are_refused() {
 }
 
 #[test]
-#[ignore = "BUG: the operating system's reason comes with the name of the temporary file"]
 fn a_file_that_cannot_be_written_is_named_without_the_temporary_one() {
     let bench = Bench::new();
     let args =
@@ -126,7 +123,6 @@ fn a_file_that_cannot_be_written_is_named_without_the_temporary_one() {
 }
 
 #[test]
-#[ignore = "BUG: `--out /dev/null` replaces the device by a file, where the folder allows it"]
 fn what_is_no_file_is_not_replaced_by_one() {
     let bench = Bench::new();
     let socket = std::os::unix::net::UnixListener::bind(bench.path("socket")).expect("a socket in the temporary folder");

@@ -159,7 +159,7 @@ fn nine_pairings_identify_all_that_is_independent_and_nothing_but_redundancy_is_
     for (name, _) in ROBOTS {
         let robot = Robot::open(name).unwrap();
         for seed in 0..3 {
-            let found = Identifiability::new(&robot.chain, &random_measurements(&robot, seed), &robot.limits);
+            let found = Identifiability::new(&robot.chain, &random_measurements(&robot, seed), &robot.limits, &[]);
             let independent = robot.chain.independent_parameters();
             let values = &found.spectrum.singular_values;
             assert_eq!(found.spectrum.rank, independent, "{name}, seed {seed}: {values:?}");

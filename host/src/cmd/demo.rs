@@ -12,7 +12,7 @@ use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, progress, write_calibrated, write_file};
 use super::table::Columns;
 use crate::files::{Dataset, RIGS, ROBOTS, Rig, Robot, Source, write_poses};
-use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals_m};
+use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
 use crate::simulate::{Shells, tool_error};
 use crate::units::{m_from_mm, mm_from_m};
 
@@ -63,6 +63,15 @@ struct FolderError {
     error: std::io::Error,
 }
 
+#[derive(Debug, Error, Diagnostic)]
+#[error("{}: holds files that are not the demo's", folder.display())]
+#[diagnostic(help("Give an empty or a new folder with --out."))]
+struct ForeignFolderError {
+    folder: PathBuf,
+}
+
+/// What the demo printed, left among its files; by it the demo knows its own folder again.
+const SUMMARY_NAME: &str = "demo.txt";
 const SIGMA_MM: f64 = 0.084;
 const FITTED_BAR_MM: f64 = 460.0;
 const OTHER_BAR_MM: f64 = 610.0;
@@ -72,8 +81,7 @@ const WORKSPACE_POSES: usize = 5_000;
 impl DemoArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let (design, truth, rig) = (Robot::open("puma560")?, Robot::open("puma560-optimised")?, Rig::open("triangles")?);
-        std::fs::create_dir_all(&self.out)
-            .map_err(|error| CommandError::output(FolderError { folder: self.out.clone(), error }))?;
+        self.prepare_folder()?;
 
         let fitted_csv = self.simulate("simulating 46 cm shells", FITTED_BAR_MM, self.seed, &design, &truth, &rig)?;
         let other_csv =
@@ -97,9 +105,22 @@ impl DemoArgs {
         let calibrated_name = "calibrated.toml";
         write_calibrated(&self.out.join(calibrated_name), &design, &fitted_poses, &fit)?;
         let names = files.iter().map(|(name, _)| *name).chain([calibrated_name]);
-        let names = names.map(|name| self.out.join(name).display().to_string()).collect();
-        print(&DemoReport::new(&design, &truth, &fit, &other_poses, names, &self.out), self.output.json)?;
+        let names = names.chain([SUMMARY_NAME]).map(|name| self.out.join(name).display().to_string()).collect();
+        let report = DemoReport::new(&design, &truth, &fit, &other_poses, names, &self.out);
+        write_file(&self.out.join(SUMMARY_NAME), &report.text())?;
+        print(&report, self.output.json)?;
         Ok(if fit.objection().is_none() { Outcome::Good } else { Outcome::Doubtful })
+    }
+
+    /// Makes the folder; one that holds other things than an earlier demo's is left alone.
+    fn prepare_folder(&self) -> Result<(), CommandError> {
+        let failed = |error| CommandError::output(FolderError { folder: self.out.clone(), error });
+        std::fs::create_dir_all(&self.out).map_err(failed)?;
+        let is_empty = std::fs::read_dir(&self.out).map_err(failed)?.next().is_none();
+        if !is_empty && !self.out.join(SUMMARY_NAME).is_file() {
+            return Err(ForeignFolderError { folder: self.out.clone() }.into());
+        }
+        write_file(&self.out.join(SUMMARY_NAME), "")
     }
 
     /// Poses of all pairings as the text of a file: what goes on is what a reader of the file would get.
@@ -138,7 +159,7 @@ fn builtin(files: &[(&str, &str)], wanted: &str) -> String {
 impl DemoReport {
     fn new(design: &Robot, truth: &Robot, fit: &Fit, other: &Dataset, files: Vec<String>, folder: &Path) -> Self {
         let fitted = &fit.solution.chain;
-        let rms = |chain| ResidualSummary::new(&residuals_m(chain, other)).rms_m;
+        let rms = |chain| ResidualSummary::new(&residuals(chain, other)).rms_m;
         let change = |before_m, after_m| Change { before_mm: mm_from_m(before_m), after_mm: mm_from_m(after_m) };
         let tool = |chain| tool_error(&truth.chain, chain, &truth.limits, WORKSPACE_POSES, 0);
         let (before, after) = (tool(&design.chain), tool(fitted));
@@ -179,7 +200,7 @@ impl Report for DemoReport {
         }
         text += &table.text();
         text += &format!("\nLeft in {}: {}\n", self.folder, self.files.join(" "));
-        let at = |name: &str| Path::new(&self.folder).join(name).display().to_string();
+        let at = |name: &str| quoted(&Path::new(&self.folder).join(name));
         let (design, rig, fitted, other, calibrated) =
             (at("design.toml"), at("rig.toml"), at("poses-460.csv"), at("poses-610.csv"), at("calibrated.toml"));
         text += &format!(
@@ -188,4 +209,11 @@ impl Report for DemoReport {
         );
         text
     }
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = text.chars().all(|c| c.is_alphanumeric() || "/._-".contains(c));
+    if is_plain { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }

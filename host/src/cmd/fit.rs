@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::inputs::{Measured, MeasuredArgs, OutputArgs};
 use super::lines::{NotIdentified, PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, warn, write_calibrated};
-use super::table::Columns;
+use super::report::{Report, print, write_calibrated};
+use super::table::{Columns, fixed};
 use crate::files::{Dataset, Rig};
 use crate::identify::{
     ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, plausible_error, remarks,
@@ -90,8 +90,10 @@ pub(super) struct FitReport {
     warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    not_written_because: Option<String>,
+    /// Why the result is not to be kept; nothing was written then.
+    objection: Option<String>,
+    #[serde(skip)]
+    asked_out: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -143,21 +145,15 @@ impl FitArgs {
         let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, damping })?;
 
         let mut report = FitReport::new(&measured, &fit);
-        let reason = fit.objection();
         if let Some(path) = &self.out {
-            match reason {
-                None => {
-                    write_calibrated(path, &measured.robot, &measured.dataset, &fit)?;
-                    report.out = Some(path.display().to_string());
-                }
-                Some(reason) => {
-                    warn(&format!("{} was not written: {reason}", path.display()));
-                    report.not_written_because = Some(reason.to_owned());
-                }
+            report.asked_out = Some(path.display().to_string());
+            if report.objection.is_none() {
+                write_calibrated(path, &measured.robot, &measured.dataset, &fit)?;
+                report.out = report.asked_out.clone();
             }
         }
         print(&report, self.output.json)?;
-        Ok(if reason.is_none() { Outcome::Good } else { Outcome::Doubtful })
+        Ok(if report.objection.is_none() { Outcome::Good } else { Outcome::Doubtful })
     }
 }
 
@@ -195,15 +191,17 @@ impl FitReport {
             by_pairing: pairing_changes(rig, fit),
             outliers: outlier_details.iter().map(|outlier| outlier.row).collect(),
             outlier_details,
-            largest: largest(dataset, rig, &fit.residuals_m, 5),
+            largest: largest(dataset, rig, &fit.residuals, 5),
             remarks: remarks(&robot.chain, dataset, rig, &robot.limits)
                 .into_iter()
+                .chain(outlier_remark(dataset, fit))
                 .chain(runaway_remark(fit))
                 .chain(drift_remark(fit))
                 .collect(),
             warnings: warnings.clone(),
             out: None,
-            not_written_because: None,
+            objection: fit.objection().map(|objection| objection.to_string()),
+            asked_out: None,
         }
     }
 }
@@ -220,15 +218,15 @@ impl ParameterLine {
             change: unit.from_si(parameter.fitted - parameter.initial),
             std: parameter.std.map(|std| unit.from_si(std)),
             held: parameter.held.is_some(),
-            why: parameter.held.clone(),
+            why: parameter.held.as_ref().map(|held| held.to_string()),
         }
     }
 
     fn cells(&self) -> [String; 7] {
         let digits = if self.unit == "mm" { 4 } else { 6 };
-        let number = |value: f64| format!("{value:.digits$}");
+        let number = |value: f64| fixed(value, digits);
         let (fitted, change) =
-            if self.held { (String::new(), String::new()) } else { (number(self.fitted), format!("{:+.digits$}", self.change)) };
+            if self.held { (String::new(), String::new()) } else { (number(self.fitted), signed(self.change, digits)) };
         let std = match (self.held, self.std) {
             (true, _) => String::new(),
             (false, Some(std)) => number(std),
@@ -237,6 +235,17 @@ impl ParameterLine {
         let held = self.why.as_ref().map(|why| format!("held: {why}")).unwrap_or_default();
         [self.name.clone(), self.unit.to_owned(), number(self.initial), fitted, change, std, held]
     }
+}
+
+/// Rows that stand out weigh on all that is said before them.
+fn outlier_remark(dataset: &Dataset, fit: &Fit) -> Option<String> {
+    let worst = fit.outliers.first()?;
+    Some(format!(
+        "{} stand out (list at the end), the worst at {} with {:.3} mm. They weigh on all numbers here: look at them first.",
+        if fit.outliers.len() == 1 { "1 row".to_owned() } else { format!("{} rows", fit.outliers.len()) },
+        dataset.place(worst.row),
+        mm_from_m(fit.residuals[worst.row].value_m)
+    ))
 }
 
 /// Parameters that went where no robot's are.
@@ -265,6 +274,12 @@ fn drift_remark(fit: &Fit) -> Option<String> {
     ))
 }
 
+/// A change with its sign; none where it rounds to zero.
+fn signed(change: f64, decimals: usize) -> String {
+    let text = fixed(change, decimals);
+    if change > 0.0 && text != fixed(0.0, decimals) { format!("+{text}") } else { text }
+}
+
 fn pairing_changes(rig: &Rig, fit: &Fit) -> Vec<PairingChange> {
     let pairs = fit.initial_by_pairing.iter().zip(&fit.fitted_by_pairing);
     let change = |(initial, fitted): (&crate::identify::PairingResiduals, _)| PairingChange {
@@ -278,7 +293,7 @@ fn outlier_lines(dataset: &Dataset, fit: &Fit) -> Vec<OutlierLine> {
     let line = |outlier: &crate::identify::Outlier| OutlierLine {
         row: outlier.row + 1,
         place: dataset.place(outlier.row),
-        residual_mm: mm_from_m(fit.residuals_m[outlier.row]),
+        residual_mm: mm_from_m(fit.residuals[outlier.row].value_m),
         score: outlier.score,
         beside: match outlier.test {
             OutlierTest::All => "all",
@@ -305,10 +320,14 @@ impl Report for FitReport {
         text += "\nlargest residuals (measured less computed)\n";
         text += &largest_text(&self.largest);
         text += &self.outliers_text();
-        if let Some(out) = &self.out {
-            text += &format!("\nwrote {out}\n");
+        if let Some(objection) = &self.objection {
+            text += &format!("\nNOT TO BE TRUSTED AS IT IS: {objection}\n");
         }
-        text
+        text + &match (&self.out, &self.asked_out) {
+            (Some(out), _) => format!("\nwrote {out}\n"),
+            (None, Some(asked)) => format!("{asked} was not written\n"),
+            (None, None) => String::new(),
+        }
     }
 }
 
@@ -316,7 +335,8 @@ impl FitReport {
     fn headline(&self) -> String {
         let status = self.status.replace('_', " ");
         let mut text = format!("{}, {} poses\n\n", self.robot, self.poses);
-        text += &format!("{status} after {} steps: {}\n", self.iterations, self.explanation);
+        let steps = if self.iterations == 1 { "step" } else { "steps" };
+        text += &format!("{status} after {} {steps}: {}\n", self.iterations, self.explanation);
         text += &format!(
             "{} of {} parameters free; rank {}, at most {} can be independent; condition {}\n",
             self.free_parameters,
@@ -340,7 +360,7 @@ impl FitReport {
         let mut table = Columns::new(&["<pairing", "poses", "RMS before mm", "RMS after mm", "mean mm", "largest mm"]);
         for line in &self.by_pairing {
             let fitted = &line.fitted;
-            let numbers = [line.initial_rms_mm, fitted.rms_mm, fitted.mean_mm, fitted.max_abs_mm].map(|mm| format!("{mm:.4}"));
+            let numbers = [line.initial_rms_mm, fitted.rms_mm, fitted.mean_mm, fitted.max_abs_mm].map(|mm| fixed(mm, 4));
             table.row([fitted.pairing.clone(), fitted.poses.to_string()].into_iter().chain(numbers));
         }
         table.text()
@@ -356,7 +376,7 @@ impl FitReport {
             table.row([
                 outlier.row.to_string(),
                 outlier.place.clone(),
-                format!("{:.4}", outlier.residual_mm),
+                fixed(outlier.residual_mm, 4),
                 format!("{:+.1}", outlier.score),
                 beside.to_owned(),
             ]);

@@ -9,7 +9,7 @@ use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn};
 use crate::files::Robot;
-use crate::units::{ScreenUnit, mm_from_m};
+use crate::units::{ScreenUnit, mm_from_m, tidy};
 
 /// Pose of the tool at given joint values (forward kinematics)
 #[derive(Args)]
@@ -32,6 +32,8 @@ struct FkReport {
     rotation: [[f64; 3]; 3],
     /// The same rotation as a link's angles: Rz(alpha) · Ry(beta) · Rx(gamma).
     alpha_beta_gamma_deg: [f64; 3],
+    /// Joints beyond their limits, in words.
+    warnings: Vec<String>,
 }
 
 impl FkArgs {
@@ -52,21 +54,39 @@ impl FkArgs {
         if self.q.len() != kinds.len() {
             return Err(wrong_count.into());
         }
-        for (joint, (limits, &value)) in robot.limits.iter().zip(&q).enumerate() {
-            if !limits.contain(value) {
-                warn(&format!("joint {} is beyond its limits", joint + 1));
-            }
+        let warnings = beyond_limits(robot, &q);
+        for warning in &warnings {
+            warn(warning);
         }
         let q = robot.chain.joint_vector(&q).map_err(|_| wrong_count)?;
         let base_from_tool = Kinematics::new(&robot.chain).base_from_tool(&q);
         let r = base_from_tool.rotation;
         let angles = [r[(1, 0)].atan2(r[(0, 0)]), (-r[(2, 0)]).atan2(r[(2, 1)].hypot(r[(2, 2)])), r[(2, 1)].atan2(r[(2, 2)])];
         Ok(FkReport {
-            position_mm: base_from_tool.translation_m.map(mm_from_m).into(),
-            rotation: std::array::from_fn(|i| std::array::from_fn(|j| r[(i, j)])),
-            alpha_beta_gamma_deg: angles.map(f64::to_degrees),
+            position_mm: base_from_tool.translation_m.map(|m| positive_zero(mm_from_m(m))).into(),
+            rotation: std::array::from_fn(|i| std::array::from_fn(|j| positive_zero(r[(i, j)]))),
+            alpha_beta_gamma_deg: angles.map(|angle| positive_zero(angle.to_degrees())),
+            warnings,
         })
     }
+}
+
+/// Joints of an encoder vector beyond their limits.
+fn beyond_limits(robot: &Robot, q: &[f64]) -> Vec<String> {
+    let joints = robot.limits.iter().zip(robot.chain.joint_kinds()).zip(q).enumerate();
+    let beyond = joints.filter(|(_, ((limits, _), q))| !limits.contain(**q));
+    beyond
+        .map(|(i, ((limits, &kind), &q))| {
+            let unit = ScreenUnit::from(kind);
+            let [q, min, max] = [q, limits.min, limits.max].map(|value| tidy(unit.from_si(value)));
+            format!("joint {} at {q} {} is beyond its limits, {min} to {max}", i + 1, unit.name())
+        })
+        .collect()
+}
+
+/// Zero without a sign, and what would be printed as a signed zero.
+fn positive_zero(value: f64) -> f64 {
+    if value.abs() < 5e-13 { 0.0 } else { value }
 }
 
 impl Report for FkReport {

@@ -73,7 +73,7 @@ fn summarise(dataset: &Dataset, warnings: &[(usize, RowWarning)]) -> Vec<String>
     let sentence = |(text, rows): &(String, Vec<usize>)| {
         let places: Vec<String> = rows.iter().take(SHOWN).map(|&row| dataset.place(row)).collect();
         let more = if rows.len() > SHOWN { format!(" and {} more", rows.len() - SHOWN) } else { String::new() };
-        format!("{} of {} poses {text}: {}{more}", rows.len(), dataset.rows.len(), places.join(", "))
+        format!("poses that {text}: {} of {}, at {}{more}", rows.len(), dataset.rows.len(), places.join(", "))
     };
     kinds.iter().map(sentence).collect()
 }
@@ -90,7 +90,8 @@ pub(super) enum ListError {
     RepeatedPairing(String),
     /// No pose has one of these pairings.
     #[error("no pose has one of the pairings {0}")]
-    NoPoseLeft(String),
+    #[diagnostic(help("The poses have {1}."))]
+    NoPoseLeft(String, String),
     /// No bar length to simulate.
     #[error("the rig names no bar length")]
     #[diagnostic(help("Give one, in millimetres: --bar 460"))]

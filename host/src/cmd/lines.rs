@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::table::Columns;
+use super::table::{Columns, fixed};
 use crate::files::{Dataset, Rig};
-use crate::identify::{Finding, Identifiability, PairingResiduals};
+use crate::identify::{Finding, Identifiability, PairingResiduals, Residual};
 use crate::units::mm_from_m;
 
 /// Residuals of one pairing, for tables and JSON.
@@ -42,14 +42,15 @@ pub(super) struct ResidualLine {
 }
 
 /// The rows with the largest residuals, the worst first.
-pub(super) fn largest(dataset: &Dataset, rig: &Rig, residuals_m: &[f64], count: usize) -> Vec<ResidualLine> {
-    let mut order: Vec<usize> = (0..residuals_m.len()).collect();
-    order.sort_by(|&a, &b| residuals_m[b].abs().total_cmp(&residuals_m[a].abs()));
+pub(super) fn largest(dataset: &Dataset, rig: &Rig, residuals: &[Residual], count: usize) -> Vec<ResidualLine> {
+    let mut order: Vec<usize> = (0..residuals.len()).collect();
+    let size = |row: usize| residuals[row].value_m.abs();
+    order.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
     let line = |&row: &usize| ResidualLine {
         row: row + 1,
         place: dataset.place(row),
         pairing: rig.pairing_name(dataset.rows[row].pairing),
-        residual_mm: mm_from_m(residuals_m[row]),
+        residual_mm: mm_from_m(residuals[row].value_m),
     };
     order.iter().take(count).map(line).collect()
 }
@@ -58,7 +59,7 @@ pub(super) fn largest(dataset: &Dataset, rig: &Rig, residuals_m: &[f64], count: 
 pub(super) fn largest_text(lines: &[ResidualLine]) -> String {
     let mut table = Columns::new(&["row", "<at", "<pairing", "residual mm"]);
     for line in lines {
-        table.row([line.row.to_string(), line.place.clone(), line.pairing.clone(), format!("{:.4}", line.residual_mm)]);
+        table.row([line.row.to_string(), line.place.clone(), line.pairing.clone(), fixed(line.residual_mm, 4)]);
     }
     table.text()
 }

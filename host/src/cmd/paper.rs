@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, progress};
-use super::table::Columns;
+use super::table::{Columns, fixed};
 use crate::identify::{Spectrum, bound_by_ends};
 use crate::paper::{Experiment, RankClass, Recovered, run, stated};
 use crate::units::{ScreenUnit, mm_from_m};
@@ -278,7 +278,7 @@ impl Report for PaperReport {
         text += "\nFig. 3: residuals against the longitude of the shells\n";
         let mut table = Columns::new(&["from deg", "to deg", "poses", "mean mm", "RMS mm"]);
         for slice in &self.by_longitude {
-            let numbers = [format!("{:.4}", slice.mean_mm), format!("{:.4}", slice.rms_mm)];
+            let numbers = [fixed(slice.mean_mm, 4), fixed(slice.rms_mm, 4)];
             table.row([slice.from_deg.to_string(), slice.to_deg.to_string(), slice.poses.to_string()].into_iter().chain(numbers));
         }
         text += &table.text();
@@ -323,7 +323,7 @@ impl PaperReport {
         let mut table = Columns::new(&["<parameter", "<unit", "design", "Table II", "recovered", "difference", "std. dev."]);
         for line in &self.table_two {
             let digits = if line.unit == "mm" { 4 } else { 6 };
-            let number = |value: f64| format!("{value:.digits$}");
+            let number = |value: f64| fixed(value, digits);
             let std = line.std.map_or_else(String::new, number);
             let numbers = [line.design, line.table_two, line.recovered, line.difference].map(number);
             table.row([line.name.clone(), line.unit.to_owned()].into_iter().chain(numbers).chain([std]));

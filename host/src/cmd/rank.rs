@@ -9,6 +9,7 @@ use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
 use super::table::Columns;
 use crate::identify::{Identifiability, bound_by_pairings, remarks};
+use crate::units::mm_from_m;
 
 /// How many parameters these poses can identify, and which they cannot
 #[derive(Args)]
@@ -33,6 +34,8 @@ struct RankReport {
     independent_expected: usize,
     /// The most that these chucks and spheres allow.
     bound_by_pairings: usize,
+    /// What no linear change of the independent parameters explains of the lengths, RMS; weak parameters are judged by it.
+    noise_mm: f64,
     /// Of the Jacobian with scaled columns, descending.
     singular_values: Vec<f64>,
     /// Last value that counts, first that does not.
@@ -47,9 +50,11 @@ impl RankArgs {
         let mut measured = self.measured.read()?;
         if let Some(list) = &self.pairings {
             let pairings = parse_pairings(list, &measured.rig)?;
+            let had: Vec<String> =
+                measured.dataset.pairings().iter().map(|&pairing| measured.rig.pairing_name(pairing)).collect();
             measured.dataset.rows.retain(|row| pairings.contains(&row.pairing));
             if measured.dataset.rows.is_empty() {
-                return Err(ListError::NoPoseLeft(list.clone()).into());
+                return Err(ListError::NoPoseLeft(list.clone(), had.join(",")).into());
             }
         }
         print(&report(measured), self.output.json)?;
@@ -59,7 +64,7 @@ impl RankArgs {
 
 fn report(measured: Measured) -> RankReport {
     let Measured { robot, rig, dataset, warnings } = measured;
-    let found = Identifiability::new(&robot.chain, &dataset.measurements(), &robot.limits);
+    let found = Identifiability::new(&robot.chain, &dataset.measurements(), &robot.limits, &[]);
     RankReport {
         poses: dataset.rows.len(),
         pairings: dataset.pairings().into_iter().map(|pairing| rig.pairing_name(pairing)).collect(),
@@ -67,6 +72,7 @@ fn report(measured: Measured) -> RankReport {
         parameters: robot.chain.parameter_count(),
         independent_expected: robot.chain.independent_parameters(),
         bound_by_pairings: bound_by_pairings(&robot.chain, &dataset),
+        noise_mm: mm_from_m(found.noise_m),
         gap: found.spectrum.gap(),
         not_identified: NotIdentified::all(&found),
         remarks: remarks(&robot.chain, &dataset, &rig, &robot.limits),
@@ -84,6 +90,7 @@ impl Report for RankReport {
             self.rank, self.parameters, self.independent_expected, self.bound_by_pairings
         );
         text += &self.spectrum_text();
+        text += &format!("\nnoise of these lengths, as far as no parameter explains it: {:.4} mm RMS\n", self.noise_mm);
         for remark in &self.remarks {
             text += &format!("\n{remark}\n");
         }
@@ -97,8 +104,12 @@ impl RankReport {
         const PER_LINE: usize = 9;
         let mut text = "singular values of the Jacobian with scaled columns\n".to_owned();
         for line in self.singular_values[..self.rank].chunks(PER_LINE) {
-            let values: Vec<String> = line.iter().map(|value| format!("{value:9.2e}")).collect();
+            let show = |&value: &f64| if value < 1e-3 { format!("{value:9.1e}") } else { format!("{value:9.4}") };
+            let values: Vec<String> = line.iter().map(show).collect();
             text += &format!("  {}\n", values.join(" "));
+        }
+        if self.rank == 0 {
+            return text + "  (every value is zero: no length depends on any parameter)\n";
         }
         text + &match self.gap {
             Some((last, first)) if first > 0.0 && first / last > 1e-8 => {

@@ -31,18 +31,18 @@ pub(super) struct SimulateArgs {
     #[arg(long)]
     rig: String,
     /// Bar lengths at mid travel, millimetres; the rig's when not given
-    #[arg(long, value_delimiter = ',', value_name = "MM,…")]
+    #[arg(long, value_delimiter = ',', value_name = "MM,…", allow_hyphen_values = true)]
     bar: Vec<f64>,
     /// Pairings, chuck:sphere separated by commas; all when not given
     #[arg(long, value_name = "A:1,B:2,…")]
     pairings: Option<String>,
     /// Poses on each pairing's shell
-    #[arg(long, default_value_t = 90)]
-    per_pair: usize,
+    #[arg(long, default_value_t = 90, allow_hyphen_values = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    per_pair: u32,
     /// Standard deviation of the lengths' noise, millimetres
-    #[arg(long, default_value_t = 0.0, value_name = "MM")]
+    #[arg(long, default_value_t = 0.0, value_name = "MM", allow_hyphen_values = true)]
     sigma_mm: f64,
-    /// The same seed gives the same file on every machine
+    /// The same seed gives the same poses and noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Write the poses to this file
@@ -101,7 +101,7 @@ impl SimulateArgs {
         let bar_mm = self.bar_mm(rig)?;
         self.check(truth, planned_with)?;
 
-        let bar = progress((bar_mm.len() * pairings.len() * self.per_pair) as u64, "simulating poses");
+        let bar = progress((bar_mm.len() * pairings.len()) as u64 * u64::from(self.per_pair), "simulating poses");
         let mut poses = Vec::new();
         for (i, &bar_mm) in bar_mm.iter().enumerate() {
             let shells = Shells {
@@ -110,7 +110,7 @@ impl SimulateArgs {
                 rig,
                 pairings: &pairings,
                 bar_m: m_from_mm(bar_mm),
-                per_pairing: self.per_pair,
+                per_pairing: self.per_pair as usize,
                 sigma_m: m_from_mm(self.sigma_mm),
                 seed: self.seed.wrapping_add(i as u64),
             };
@@ -123,7 +123,7 @@ impl SimulateArgs {
             planned_with: planned_with.name.clone(),
             bar_mm,
             pairings: pairings.iter().map(|&pairing: &PairingId| rig.pairing_name(pairing)).collect(),
-            per_pairing: self.per_pair,
+            per_pairing: self.per_pair as usize,
             sigma_mm: self.sigma_mm,
             seed: self.seed,
             poses: poses.len(),
@@ -143,14 +143,11 @@ impl SimulateArgs {
 
     fn check(&self, truth: &Robot, planned_with: &Robot) -> Result<(), CommandError> {
         let refuse = |flag, found: String, expected| Err(ListError::Number { flag, found, expected }.into());
-        if let Some(bar) = self.bar.iter().find(|&&mm| !(mm.is_finite() && mm > 0.0)) {
-            return refuse("--bar", bar.to_string(), "a number above zero");
+        if let Some(bar) = self.bar.iter().find(|&&mm| !(mm > 0.0 && mm <= 1e6)) {
+            return refuse("--bar", bar.to_string(), "a number above 0, at most 1e6");
         }
-        if !(self.sigma_mm.is_finite() && self.sigma_mm >= 0.0) {
-            return refuse("--sigma-mm", self.sigma_mm.to_string(), "zero or a number above it");
-        }
-        if self.per_pair == 0 {
-            return refuse("--per-pair", "0".to_owned(), "at least 1");
+        if !(0.0..=1e6).contains(&self.sigma_mm) {
+            return refuse("--sigma-mm", self.sigma_mm.to_string(), "a number from 0 to 1e6");
         }
         if truth.chain.joint_kinds() != planned_with.chain.joint_kinds() {
             return refuse("--plan-robot", planned_with.name.clone(), "a robot with the same joints as --robot");

@@ -29,3 +29,12 @@ impl Columns {
         self.0.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
     }
 }
+
+/// A number with so many decimals; what rounds to zero has no sign.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
+        _ => text,
+    }
+}

@@ -7,8 +7,8 @@ use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs};
 use super::lines::{PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
-use super::table::Columns;
-use crate::identify::{ResidualSummary, by_pairing, residuals_m};
+use super::table::{Columns, fixed};
+use crate::identify::{ResidualSummary, by_pairing, residuals};
 use crate::units::mm_from_m;
 
 /// Residuals on poses that the fit has not seen
@@ -20,7 +20,7 @@ pub(super) struct ValidateArgs {
     #[command(flatten)]
     measured: MeasuredArgs,
     /// End with exit code 1 when the RMS residual is above this
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     max_rms_mm: Option<f64>,
     #[command(flatten)]
     output: OutputArgs,
@@ -55,8 +55,8 @@ impl ValidateArgs {
 
     fn report(&self, measured: Measured) -> ValidateReport {
         let Measured { robot, rig, dataset, warnings } = measured;
-        let residuals_m = residuals_m(&robot.chain, &dataset);
-        let summary = ResidualSummary::new(&residuals_m);
+        let residuals = residuals(&robot.chain, &dataset);
+        let summary = ResidualSummary::new(&residuals);
         let rms_mm = mm_from_m(summary.rms_m);
         ValidateReport {
             calibrated: robot.calibration.is_some(),
@@ -65,8 +65,8 @@ impl ValidateArgs {
             rms_mm,
             max_abs_mm: mm_from_m(summary.max_abs_m),
             mean_mm: mm_from_m(summary.mean_m),
-            by_pairing: by_pairing(&dataset, &residuals_m).iter().map(|one| PairingLine::new(&rig, one)).collect(),
-            largest: largest(&dataset, &rig, &residuals_m, 5),
+            by_pairing: by_pairing(&dataset, &residuals).iter().map(|one| PairingLine::new(&rig, one)).collect(),
+            largest: largest(&dataset, &rig, &residuals, 5),
             within_max_rms: self.max_rms_mm.map(|limit| rms_mm <= limit),
             warnings,
         }
@@ -80,7 +80,7 @@ impl Report for ValidateReport {
         text += &format!("RMS {:.4} mm, mean {:.4} mm, largest {:.4} mm\n\n", self.rms_mm, self.mean_mm, self.max_abs_mm);
         let mut table = Columns::new(&["<pairing", "poses", "RMS mm", "mean mm", "largest mm"]);
         for line in &self.by_pairing {
-            let numbers = [line.rms_mm, line.mean_mm, line.max_abs_mm].map(|mm| format!("{mm:.4}"));
+            let numbers = [line.rms_mm, line.mean_mm, line.max_abs_mm].map(|mm| fixed(mm, 4));
             table.row([line.pairing.clone(), line.poses.to_string()].into_iter().chain(numbers));
         }
         text += &table.text();

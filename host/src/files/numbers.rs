@@ -17,27 +17,67 @@ pub(super) fn deserialize<T: for<'de> Deserialize<'de>>(source: &Source) -> Resu
     })
 }
 
-/// A number that is finite.
-pub(super) fn finite(source: &Source, field: &str, number: &Spanned<f64>) -> Result<f64, InputError> {
-    checked(source, field, number, f64::is_finite, "a finite number")
+/// What a number of a file may be.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Range {
+    /// Any that a length in millimetres or an angle in degrees can be: a million at most, so that squares stay far from the
+    /// ends of what a number can hold.
+    Plausible,
+    /// Plausible and above zero.
+    Positive,
+    /// A standard deviation in millimetres: a nanometre to a kilometre.
+    Deviation,
+    /// A joint's scale.
+    Scale,
+    /// Encoder counts per turn or millimetre.
+    Counts,
+    /// Finite.
+    Finite,
 }
 
-/// A number that is finite and above zero.
-pub(super) fn positive(source: &Source, field: &str, number: &Spanned<f64>) -> Result<f64, InputError> {
-    checked(source, field, number, |x| x.is_finite() && x > 0.0, "a number above zero")
+impl Range {
+    /// Whether a number is in it. No range has infinities or what is not a number.
+    pub(super) fn contains(self, x: f64) -> bool {
+        const MOST: f64 = 1e6;
+        match self {
+            Self::Plausible => x.abs() <= MOST,
+            Self::Positive => x > 0.0 && x <= MOST,
+            Self::Deviation => (1e-6..=MOST).contains(&x),
+            Self::Scale => (1e-3..=1e3).contains(&x.abs()),
+            Self::Counts => x > 0.0 && x <= 1e12,
+            Self::Finite => x.is_finite(),
+        }
+    }
+
+    /// The range in words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Plausible => "a number from -1e6 to 1e6",
+            Self::Positive => "a number above 0, at most 1e6",
+            Self::Deviation => "a number from 1e-6 to 1e6",
+            Self::Scale => "a number of size 0.001 to 1000",
+            Self::Counts => "a number above 0, at most 1e12",
+            Self::Finite => "a finite number",
+        }
+    }
 }
 
-fn checked(
-    source: &Source,
-    field: &str,
-    number: &Spanned<f64>,
-    is_good: fn(f64) -> bool,
-    expected: &'static str,
-) -> Result<f64, InputError> {
+/// A vector of three plausible numbers.
+pub(super) fn vector(source: &Source, field: &'static str, numbers: &Spanned<Vec<Spanned<f64>>>) -> Result<[f64; 3], InputError> {
+    let [x, y, z] = numbers.as_ref().as_slice() else {
+        let problem = Problem::VectorLength { field, found: numbers.as_ref().len() };
+        return Err(InputError::at(source, numbers.span(), problem));
+    };
+    let number = |component| in_range(source, field, component, Range::Plausible);
+    Ok([number(x)?, number(y)?, number(z)?])
+}
+
+/// A number in a range.
+pub(super) fn in_range(source: &Source, field: &str, number: &Spanned<f64>, range: Range) -> Result<f64, InputError> {
     let found = *number.as_ref();
-    if is_good(found) {
+    if range.contains(found) {
         return Ok(found);
     }
-    let problem = Problem::Number { field: field.to_owned(), found: found.to_string(), expected };
+    let problem = Problem::Number { field: field.to_owned(), found: found.to_string(), expected: range.words() };
     Err(InputError::at(source, number.span(), problem))
 }

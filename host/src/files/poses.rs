@@ -112,27 +112,27 @@ impl Dataset {
 /// The text of a file of poses; columns as the robot's joints need them.
 pub fn write_poses(robot: &Robot, rig: &Rig, rows: &[PoseRow]) -> String {
     let kinds = robot.chain.joint_kinds();
+    let has_set = rows.iter().any(|row| row.set.is_some());
     let mut header = vec!["chuck".to_owned(), "sphere".to_owned()];
     header.extend(kinds.iter().enumerate().map(|(i, &kind)| joint_column(i, kind)));
     header.push("length_mm".to_owned());
-    let has_set = rows.iter().any(|row| row.set.is_some());
-    if has_set {
-        header.push("set".to_owned());
-    }
-    let mut text = header.join(",") + "\n";
-    for row in rows {
+    header.extend(has_set.then(|| "set".to_owned()));
+
+    let lines = rows.iter().map(|row| {
         let mut fields = vec![rig.chucks[row.pairing.chuck].name.clone(), rig.spheres[row.pairing.sphere].name.clone()];
         // Nanometres and nanodegrees: far below any encoder, and short enough to read.
-        let q =
-            kinds.iter().zip(row.measurement.q.as_array()).map(|(&kind, &q)| format!("{:.9}", ScreenUnit::from(kind).from_si(q)));
-        fields.extend(q);
+        let q = kinds.iter().zip(row.measurement.q.as_array());
+        fields.extend(q.map(|(&kind, &q)| format!("{:.9}", ScreenUnit::from(kind).from_si(q))));
         fields.push(format!("{:.6}", mm_from_m(row.measurement.length_m)));
-        if has_set {
-            fields.push(row.set.clone().unwrap_or_default());
-        }
-        text += &(fields.join(",") + "\n");
+        fields.extend(has_set.then(|| row.set.clone().unwrap_or_default()));
+        fields
+    });
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for record in std::iter::once(header).chain(lines) {
+        // Writing to memory cannot fail.
+        let _ = writer.write_record(record);
     }
-    text
+    String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
 /// Name of a joint's column: `q1_deg`, `q3_mm`.

@@ -54,6 +54,14 @@ pub enum Problem {
         /// The key that it needs.
         key: String,
     },
+    /// A vector that has not three numbers.
+    #[error("`{field}` has {found} numbers, expected 3")]
+    VectorLength {
+        /// The key.
+        field: &'static str,
+        /// How many stand there.
+        found: usize,
+    },
     /// A number that is infinite, not a number, or out of its range.
     #[error("`{field}` is {found}, expected {expected}")]
     Number {
@@ -87,6 +95,9 @@ pub enum Problem {
     /// No chuck or no sphere in a rig.
     #[error("no {0}, expected at least one")]
     Empty(&'static str),
+    /// A bar without a length.
+    #[error("no bar length, expected at least one")]
+    NoBarLength,
     /// Two chucks, spheres, columns of one name.
     #[error("{what} `{name}` stands there twice")]
     Duplicate {
@@ -96,7 +107,7 @@ pub enum Problem {
         name: String,
     },
     /// A chuck's or sphere's name that a pairing `A:1,B:2` or a CSV field cannot hold.
-    #[error("the name `{0}` is empty or holds a comma, colon, quote, `#` or white space at its ends")]
+    #[error("the name {0:?} is empty or holds a comma, colon, quote, `#`, control character or white space at its ends")]
     Name(String),
     /// The poses' header lacks a column.
     #[error("the column `{0}` is missing")]
@@ -150,6 +161,15 @@ pub enum Problem {
         /// The rig's names.
         known: String,
     },
+    /// A field with nothing in it.
+    #[error("column `{column}`: the field is empty")]
+    EmptyField {
+        /// The column.
+        column: String,
+    },
+    /// A quote that goes on over the end of its line.
+    #[error("a quote that is opened on this line is not closed on it")]
+    OpenQuote,
     /// A header and nothing else.
     #[error("no poses")]
     NoPoses,
@@ -157,7 +177,7 @@ pub enum Problem {
     #[error("not CSV: {0}")]
     Csv(String),
     /// `sigma_mm` in one file of poses and not in another.
-    #[error("`sigma_mm` is given for some poses and not for others")]
+    #[error("`sigma_mm` is given here and not in the files before, or the other way round")]
     MixedSigma,
 }
 
@@ -166,16 +186,25 @@ impl Problem {
     pub(super) fn help(&self) -> Option<String> {
         let help = match self {
             Self::NoSuchFile { what, builtins } => return Some(format!("Give a path, or a built-in {what}: {builtins}.")),
-            Self::Unreadable(_) | Self::Csv(_) | Self::FieldCount { .. } => return None,
+            Self::Unreadable(_) | Self::Csv(_) | Self::Number { .. } | Self::VectorLength { .. } | Self::EmptyField { .. } => {
+                return None;
+            }
+            Self::FieldCount { .. } => "Is there a decimal comma? Numbers are written with a point, fields are parted by commas.",
+            Self::OpenQuote => "Close the quote, or write the field without quotes.",
+            Self::NoBarLength => "lengths_mm holds the bar's length at mid travel, one for each extension.",
+            Self::JointColumns { found: 0, .. } => {
+                "The first line must be the header, parted by commas: chuck,sphere,q1_deg,…,qJ_deg,length_mm."
+            }
             Self::Toml(_) => "The keys and their units are in docs/files.md.",
             Self::JointCount { .. } | Self::LinkCount { .. } => "A chain is link 1, joint 1, link 2, … joint J, link J+1.",
             Self::JointUnit { .. } | Self::ColumnUnit { .. } => "Angles are in degrees (`_deg`), slides in millimetres (`_mm`).",
             Self::JointKeyMissing { .. } => "A joint needs type, offset, scale and both limits.",
-            Self::Number { .. } | Self::NotANumber { .. } => "Write a plain decimal number with a point.",
+            Self::NotANumber { .. } => "Write a plain decimal number with a point.",
             Self::Limits { .. } => "Limits are those of the encoder output q.",
             Self::Coupling { .. } => "`coupling = { joint = 5, ratio = 0.18 }` on joint 6: it turns by 0.18 of joint 5's turn.",
             Self::Empty(_) => "A rig needs chucks and spheres.",
-            Self::Duplicate { .. } | Self::Name(_) => "Names are how poses and pairings refer to chucks, spheres and columns.",
+            Self::Duplicate { .. } => "Give each a name of its own.",
+            Self::Name(_) => "Poses and pairings (A:1,B:2) refer to chucks and spheres by these names.",
             Self::MissingColumn(_) | Self::UnknownColumn(_) | Self::JointColumns { .. } => {
                 "Expected: chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); optional: sigma_mm, set, t_s."
             }

@@ -6,6 +6,7 @@ use std::path::Path;
 use ballbar::{JointKind, Measurement};
 use csv::{ReaderBuilder, StringRecord, Trim};
 
+use super::numbers::Range as Of;
 use super::poses::{Dataset, PoseRow, joint_column};
 use super::problem::Problem;
 use super::rig::{NamedPoint, PairingId, Rig};
@@ -78,11 +79,18 @@ impl FileReader<'_> {
         let mut reader =
             ReaderBuilder::new().comment(Some(b'#')).trim(Trim::All).flexible(true).from_reader(self.source.text().as_bytes());
         let broken = |error: csv::Error| InputError::of_file(self.source.name(), Problem::Csv(error.to_string()));
+        if self.source.text().trim().is_empty() {
+            return Err(InputError::of_file(self.source.name(), Problem::NoPoses));
+        }
         let header = reader.headers().map_err(broken)?.clone();
         let columns = self.columns(&header)?;
         let mut rows = Vec::new();
         for record in reader.records() {
-            rows.push(self.row(&header, &columns, &record.map_err(broken)?)?);
+            let record = record.map_err(broken)?;
+            // A line of white space is as empty as an empty one.
+            if record.len() > 1 || !record[0].is_empty() {
+                rows.push(self.row(&header, &columns, &record)?);
+            }
         }
         if rows.is_empty() {
             return Err(InputError::of_file(self.source.name(), Problem::NoPoses));
@@ -146,6 +154,9 @@ impl FileReader<'_> {
     }
 
     fn row(&self, header: &StringRecord, columns: &Columns, record: &StringRecord) -> Result<PoseRow, InputError> {
+        if record.iter().any(|field| field.contains('\n')) {
+            return Err(InputError::at(self.source, self.line_span(record), Problem::OpenQuote));
+        }
         if record.len() != header.len() {
             let problem = Problem::FieldCount { found: record.len(), expected: header.len() };
             return Err(InputError::at(self.source, self.line_span(record), problem));
@@ -156,12 +167,11 @@ impl FileReader<'_> {
 
         let mut q = Vec::with_capacity(columns.q.len());
         for (&column, &kind) in columns.q.iter().zip(self.robot.chain.joint_kinds()) {
-            q.push(ScreenUnit::from(kind).to_si(self.number(header, record, column, |x| x.is_finite(), "a finite number")?));
+            q.push(ScreenUnit::from(kind).to_si(self.number(header, record, column, Of::Plausible)?));
         }
-        let above_zero = |x: f64| x.is_finite() && x > 0.0;
-        let length_m = m_from_mm(self.number(header, record, columns.length, above_zero, "a number above zero")?);
-        let sigma = columns.sigma.map(|column| self.number(header, record, column, above_zero, "a number above zero"));
-        let t_s = columns.t.map(|column| self.number(header, record, column, |x| x.is_finite(), "a finite number"));
+        let length_m = m_from_mm(self.number(header, record, columns.length, Of::Positive)?);
+        let sigma = columns.sigma.map(|column| self.number(header, record, column, Of::Deviation));
+        let t_s = columns.t.map(|column| self.number(header, record, column, Of::Finite));
         let joint_vector = self.robot.chain.joint_vector(&q);
         let q =
             joint_vector.map_err(|error| InputError::at(self.source, self.line_span(record), Problem::Csv(error.to_string())))?;
@@ -192,18 +202,12 @@ impl FileReader<'_> {
         })
     }
 
-    fn number(
-        &self,
-        header: &StringRecord,
-        record: &StringRecord,
-        column: usize,
-        is_good: impl Fn(f64) -> bool,
-        expected: &'static str,
-    ) -> Result<f64, InputError> {
+    fn number(&self, header: &StringRecord, record: &StringRecord, column: usize, range: Of) -> Result<f64, InputError> {
         let (name, found) = (header[column].to_owned(), record[column].to_owned());
         let problem = match found.parse::<f64>() {
-            Ok(number) if is_good(number) => return Ok(number),
-            Ok(_) => Problem::Number { field: name, found, expected },
+            Ok(number) if range.contains(number) => return Ok(number),
+            Ok(_) => Problem::Number { field: name, found, expected: range.words() },
+            Err(_) if found.is_empty() => Problem::EmptyField { column: name },
             Err(_) => Problem::NotANumber { column: name, found },
         };
         Err(InputError::at(self.source, self.field_span(record, column), problem))

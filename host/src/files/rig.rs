@@ -5,7 +5,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::builtin::RIGS;
-use super::numbers::{deserialize, finite, positive};
+use super::numbers::{Range, deserialize, in_range, vector};
 use super::problem::Problem;
 use super::source::{InputError, Source};
 use crate::units::m_from_mm;
@@ -67,7 +67,7 @@ struct RigToml {
 #[serde(deny_unknown_fields)]
 struct PointToml {
     name: Spanned<String>,
-    position_mm: [Spanned<f64>; 3],
+    position_mm: Spanned<Vec<Spanned<f64>>>,
 }
 
 #[derive(Deserialize)]
@@ -134,16 +134,13 @@ fn points(source: &Source, what: &'static str, points: &[PointToml]) -> Result<V
     for point in points {
         let name = point.name.as_ref();
         let refuse = |problem| Err(InputError::at(source, point.name.span(), problem));
-        if name.is_empty() || name.trim() != name || name.contains([',', ':', '#', '"', '\n']) {
+        if name.is_empty() || name.trim() != name || name.contains([',', ':', '#', '"']) || name.contains(char::is_control) {
             return refuse(Problem::Name(name.clone()));
         }
         if named.iter().any(|other| other.name == *name) {
             return refuse(Problem::Duplicate { what, name: name.clone() });
         }
-        let mut position_m = Vector3::zeros();
-        for (metres, millimetres) in position_m.iter_mut().zip(&point.position_mm) {
-            *metres = m_from_mm(finite(source, "position_mm", millimetres)?);
-        }
+        let position_m = Vector3::from(vector(source, "position_mm", &point.position_mm)?.map(m_from_mm));
         named.push(NamedPoint { name: name.clone(), position_m });
     }
     Ok(named)
@@ -151,8 +148,12 @@ fn points(source: &Source, what: &'static str, points: &[PointToml]) -> Result<V
 
 fn read_bar(source: &Source, bar: &BarToml) -> Result<Bar, InputError> {
     if bar.lengths_mm.as_ref().is_empty() {
-        return Err(InputError::at(source, bar.lengths_mm.span(), Problem::Empty("bar length")));
+        return Err(InputError::at(source, bar.lengths_mm.span(), Problem::NoBarLength));
     }
-    let lengths = bar.lengths_mm.as_ref().iter().map(|length| positive(source, "lengths_mm", length).map(m_from_mm));
-    Ok(Bar { lengths_m: lengths.collect::<Result<_, _>>()?, travel_m: m_from_mm(positive(source, "travel_mm", &bar.travel_mm)?) })
+    let lengths =
+        bar.lengths_mm.as_ref().iter().map(|length| in_range(source, "lengths_mm", length, Range::Positive).map(m_from_mm));
+    Ok(Bar {
+        lengths_m: lengths.collect::<Result<_, _>>()?,
+        travel_m: m_from_mm(in_range(source, "travel_mm", &bar.travel_mm, Range::Positive)?),
+    })
 }

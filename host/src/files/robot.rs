@@ -8,10 +8,10 @@ use toml::Spanned;
 use toml_edit::{DocumentMut, Item, Table, value};
 
 use super::builtin::ROBOTS;
-use super::numbers::{deserialize, finite, positive};
+use super::numbers::{Range as Of, deserialize, in_range, vector};
 use super::problem::Problem;
 use super::source::{InputError, Source};
-use crate::units::{ScreenUnit, m_from_mm};
+use crate::units::{ScreenUnit, m_from_mm, tidy};
 
 /// A robot as its file describes it.
 #[derive(Clone, Debug)]
@@ -102,8 +102,8 @@ struct RobotToml {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LinkToml {
-    translation_mm: [Spanned<f64>; 3],
-    rotation_deg: [Spanned<f64>; 3],
+    translation_mm: Spanned<Vec<Spanned<f64>>>,
+    rotation_deg: Spanned<Vec<Spanned<f64>>>,
 }
 
 #[derive(Deserialize)]
@@ -167,12 +167,8 @@ impl Robot {
         let mut limits = Vec::new();
         let mut encoders = Vec::new();
         for (i, link) in file.links.iter().enumerate() {
-            for length in &link.translation_mm {
-                parameters.push(m_from_mm(finite(source, "translation_mm", length)?));
-            }
-            for angle in &link.rotation_deg {
-                parameters.push(finite(source, "rotation_deg", angle)?.to_radians());
-            }
+            parameters.extend(vector(source, "translation_mm", &link.translation_mm)?.map(m_from_mm));
+            parameters.extend(vector(source, "rotation_deg", &link.rotation_deg)?.map(f64::to_radians));
             if let Some(joint) = file.joints.get(i) {
                 let reader = JointReader { source, number: i + 1, joints, span: joint.span(), joint: joint.as_ref() };
                 let (kind, offset, scale) = reader.model()?;
@@ -211,7 +207,8 @@ impl Robot {
             }
         }
         document.insert("calibration", Item::Table(calibration_table(calibration)));
-        Ok(document.to_string())
+        let text = document.to_string();
+        Ok(if text.starts_with(CALIBRATED_NOTE) { text } else { format!("{CALIBRATED_NOTE}{text}") })
     }
 }
 
@@ -235,11 +232,7 @@ impl JointReader<'_> {
     fn model(&self) -> Result<(JointKind, f64, f64), InputError> {
         let joint = self.joint;
         let (_, offset) = self.value("offset", ("offset_deg", &joint.offset_deg), ("offset_mm", &joint.offset_mm))?;
-        let scale = finite(self.source, "scale", &joint.scale)?;
-        if scale == 0.0 {
-            let problem = Problem::Number { field: "scale".into(), found: "0".into(), expected: "a number that is not zero" };
-            return Err(InputError::at(self.source, joint.scale.span(), problem));
-        }
+        let scale = in_range(self.source, "scale", &joint.scale, Of::Scale)?;
         Ok((self.kind().0, offset, scale))
     }
 
@@ -249,7 +242,7 @@ impl JointReader<'_> {
         let (_, max) = self.value("max", ("max_deg", &joint.max_deg), ("max_mm", &joint.max_mm))?;
         if min >= max {
             let unit = ScreenUnit::from(self.kind().0);
-            let problem = Problem::Limits { joint: self.number, min: unit.from_si(min), max: unit.from_si(max) };
+            let problem = Problem::Limits { joint: self.number, min: tidy(unit.from_si(min)), max: tidy(unit.from_si(max)) };
             return Err(InputError::at(self.source, span, problem));
         }
         Ok(JointLimits { min, max })
@@ -257,12 +250,12 @@ impl JointReader<'_> {
 
     fn encoder(&self) -> Result<EncoderFacts, InputError> {
         let joint = self.joint;
-        let ((_, own), (_, other)) =
+        let ((own_key, own), (_, other)) =
             self.by_kind(("counts_per_rev", &joint.counts_per_rev), ("counts_per_mm", &joint.counts_per_mm));
         if let Some(other) = other {
             return Err(self.wrong_unit(other.span(), "counts_per_rev", "counts_per_mm"));
         }
-        let counts = own.as_ref().map(|counts| positive(self.source, "counts_per_rev or counts_per_mm", counts)).transpose()?;
+        let counts = own.as_ref().map(|counts| in_range(self.source, own_key, counts, Of::Counts)).transpose()?;
         let unit_si = match self.kind().0 {
             JointKind::Revolute => std::f64::consts::TAU,
             JointKind::Prismatic => m_from_mm(1.0),
@@ -293,7 +286,7 @@ impl JointReader<'_> {
             let problem = Problem::Coupling { joint: self.number, to, joints: self.joints };
             return Err(InputError::at(self.source, coupling.span(), problem));
         }
-        let ratio = finite(self.source, "ratio", &coupling.as_ref().ratio)?;
+        let ratio = in_range(self.source, "ratio", &coupling.as_ref().ratio, Of::Plausible)?;
         Ok(Some(Coupling { joint: to - 1, ratio }))
     }
 
@@ -308,7 +301,7 @@ impl JointReader<'_> {
             let key = format!("{stem}_{}", unit.name());
             return Err(InputError::at(self.source, self.span.clone(), Problem::JointKeyMissing { joint: self.number, key }));
         };
-        Ok((own.span(), unit.to_si(finite(self.source, own_key, own)?)))
+        Ok((own.span(), unit.to_si(in_range(self.source, own_key, own, Of::Plausible)?)))
     }
 
     /// The key that fits this joint, then the one that does not.
@@ -348,6 +341,10 @@ fn set_numbers(item: &mut Item, numbers: impl Iterator<Item = f64>) {
         }
     }
 }
+
+/// Stands at the top of a calibrated robot's file.
+const CALIBRATED_NOTE: &str =
+    "# CALIBRATED: links and joints hold fitted parameters; comments are the design's. See [calibration] at the end.\n#\n";
 
 fn calibration_table(calibration: &Calibration) -> Table {
     let mut table = Table::new();

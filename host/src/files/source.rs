@@ -17,9 +17,9 @@ pub struct Source {
 }
 
 impl Source {
-    /// A text that comes from no file.
+    /// A text that comes from no file. Whatever ends its lines, here they end in `\n`.
     pub fn new(name: &str, text: &str) -> Self {
-        Self { name: name.into(), text: text.into() }
+        Self { name: name.into(), text: text.replace("\r\n", "\n").replace('\r', "\n").into() }
     }
 
     /// Reads a file.

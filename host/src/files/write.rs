@@ -1,6 +1,6 @@
 //! Writing a file so that no reader ever sees half of it.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use miette::Diagnostic;
@@ -15,22 +15,33 @@ pub struct WriteError {
     error: std::io::Error,
 }
 
-/// Writes `contents` beside `path` under a temporary name, flushes it to the disk and renames it onto `path`.
+/// Writes `contents` beside `path` under a temporary name, flushes it to the disk and renames it onto `path`. A link is
+/// followed; a device, pipe or folder is refused, since renaming would replace it.
 ///
 /// # Errors
 /// [`WriteError`] with the operating system's reason; an older file of that name is left as it was.
 pub fn write_atomically(path: &Path, contents: &str) -> Result<(), WriteError> {
-    let attempt = || {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        with_usual_permissions(&mut builder);
-        let mut file = builder.prefix(".host-cal-").tempfile_in(folder)?;
-        file.write_all(contents.as_bytes())?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|error| error.error)?;
-        Ok(())
+    replace(path, contents).map_err(|error| {
+        // Without the temporary name that the error may carry, which means nothing to the user.
+        let error = if error.raw_os_error().is_none() && error.kind() != ErrorKind::Other { error.kind().into() } else { error };
+        WriteError { path: path.to_owned(), error }
+    })
+}
+
+fn replace(path: &Path, contents: &str) -> std::io::Result<()> {
+    let target = match path.canonicalize() {
+        Ok(target) if target.is_file() => target,
+        Ok(_) => return Err(std::io::Error::other("it is there, but is no regular file")),
+        Err(_) => path.to_owned(),
     };
-    attempt().map_err(|error| WriteError { path: path.to_owned(), error })
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    with_usual_permissions(&mut builder);
+    let mut file = builder.prefix(".host-cal-").tempfile_in(folder)?;
+    file.write_all(contents.as_bytes())?;
+    file.as_file().sync_all()?;
+    file.persist(&target).map_err(|error| error.error)?;
+    Ok(())
 }
 
 /// Temporary files are private by default; a file renamed into place should have the mode that a plain write gives, which is

@@ -45,6 +45,10 @@ pub fn remarks(chain: &Chain<f64>, dataset: &Dataset, rig: &Rig, limits: &[Joint
             "{what} can identify at most {bound} parameters; three chucks and three spheres could identify {independent}."
         ));
     }
+    let poses = dataset.rows.len();
+    if poses < independent {
+        remarks.push(format!("{poses} poses cannot tell more than {poses} parameters, whatever they are. Measure more."));
+    }
     if spheres < 3 {
         remarks.push(format!("All lengths end at {}: turns of the tool about {} change none of them. Measure to three spheres that are not in one line.",
             plural(spheres, "sphere"), if spheres == 1 { "it" } else { "their line" }));

@@ -1,16 +1,19 @@
 //! A fit, whole: from a design and a dataset to parameters, how sure they are, and what poses left out say of them.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use ballbar::{Chain, Damping, FreeParameters, Kinematics, MAX_JOINTS, Measurement, Parameter, ParameterUnit};
 use miette::Diagnostic;
 use thiserror::Error;
 
-use super::hold::{Hold, HoldError, free_parameters};
+use super::hold::{Held, Hold, HoldError};
 use super::identifiability::Identifiability;
-use super::lm::{LmOptions, Solution, solve};
-use super::residuals::{Outlier, PairingResiduals, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals_m};
+use super::lm::{LmOptions, Solution, Status, solve};
+use super::residuals::{
+    Outlier, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
+};
 use super::uncertainty::Uncertainty;
 use crate::files::{Calibration, Dataset, Robot};
 use crate::units::mm_from_m;
@@ -56,7 +59,28 @@ pub struct FittedParameter {
     /// Standard deviation, SI; `None` where held or undetermined.
     pub std: Option<f64>,
     /// Why it was held; `None` where free.
-    pub held: Option<String>,
+    pub held: Option<Held>,
+}
+
+/// Why a fit is not worth keeping.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Objection {
+    /// The solve did not end at a minimum.
+    NoMinimum(Status),
+    /// There are too few poses to leave some out.
+    Unproven,
+    /// Poses left out are predicted worse than by the design.
+    NoBetter,
+}
+
+impl fmt::Display for Objection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoMinimum(status) => status.explanation(),
+            Self::Unproven => "there are too few poses to leave some out and prove the result on them",
+            Self::NoBetter => "poses left out of the fit are predicted no better than by the design",
+        })
+    }
 }
 
 /// How well a fit to some poses predicts the others.
@@ -64,7 +88,7 @@ pub struct FittedParameter {
 pub struct CrossValidation {
     /// Parts that were left out in turn.
     pub folds: usize,
-    /// RMS residual of the poses while they were left out, metres.
+    /// Weighted RMS residual of the poses while they were left out, metres.
     pub rms_m: f64,
 }
 
@@ -89,8 +113,8 @@ pub struct Fit {
     pub initial_by_pairing: Vec<PairingResiduals>,
     /// Residuals by pairing with the fitted values.
     pub fitted_by_pairing: Vec<PairingResiduals>,
-    /// Residuals of all rows with the fitted values, metres.
-    pub residuals_m: Vec<f64>,
+    /// Residuals of all rows with the fitted values.
+    pub residuals: Vec<Residual>,
     /// Rows that stand out after the fit.
     pub outliers: Vec<Outlier>,
     /// Correlation of residuals with the next ones measured; `None` for too few. Far from zero, something drifts or jumps.
@@ -106,17 +130,14 @@ impl Fit {
     }
 
     /// Why the result is not worth keeping; `None` when it is: a minimum was reached, and poses left out of the fit are
-    /// predicted better by it than by the design.
-    pub fn objection(&self) -> Option<&'static str> {
-        if !self.solution.status.is_minimum() {
-            return Some(self.solution.status.explanation());
-        }
-        match self.cross_validation {
-            None => Some("there are too few poses to leave some out and prove the result on them"),
-            Some(left_out) if left_out.rms_m > self.initial.rms_m => {
-                Some("poses left out of the fit are predicted no better than by the design")
-            }
-            Some(_) => None,
+    /// predicted better by it than by the design, or nothing had to be changed.
+    pub fn objection(&self) -> Option<Objection> {
+        match (self.solution.status, self.cross_validation) {
+            (Status::AlreadyOptimal, _) => None,
+            (status, _) if !status.is_minimum() => Some(Objection::NoMinimum(status)),
+            (_, None) => Some(Objection::Unproven),
+            (_, Some(left_out)) if left_out.rms_m > self.initial.rms_m => Some(Objection::NoBetter),
+            _ => None,
         }
     }
 
@@ -144,9 +165,10 @@ impl Fit {
 pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
     let design = &robot.chain;
     let measurements = dataset.measurements();
-    let identifiability = Identifiability::new(design, &measurements, &robot.limits);
-    let reasons = options.hold.reasons(design, &identifiability)?;
-    let free = free_parameters(&reasons);
+    let names = options.hold.names_of(design)?;
+    let identifiability = Identifiability::new(design, &measurements, &robot.limits, names);
+    let reasons = options.hold.reasons(design, &identifiability);
+    let free = FreeParameters::filtered(reasons.len(), |index| reasons[index].is_none());
     if measurements.len() <= free.len() {
         return Err(FitError::NoRedundancy { rows: measurements.len(), free: free.len() });
     }
@@ -157,20 +179,20 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
     let solve_time = start.elapsed();
 
     let uncertainty = Uncertainty::new(&solution.chain, &measurements, &free);
-    let residuals_before_m = residuals_m(design, dataset);
-    let residuals_after_m = residuals_m(&solution.chain, dataset);
+    let before = residuals(design, dataset);
+    let after = residuals(&solution.chain, dataset);
     Ok(Fit {
         solve_time,
         identifiability,
         parameters: fitted_parameters(design, &solution.chain, &free, &uncertainty, reasons),
-        initial: ResidualSummary::new(&residuals_before_m),
-        fitted: ResidualSummary::new(&residuals_after_m),
-        initial_by_pairing: by_pairing(dataset, &residuals_before_m),
-        fitted_by_pairing: by_pairing(dataset, &residuals_after_m),
-        outliers: outliers(dataset, &residuals_after_m),
-        neighbour_correlation: neighbour_correlation(dataset, &residuals_after_m),
+        initial: ResidualSummary::new(&before),
+        fitted: ResidualSummary::new(&after),
+        initial_by_pairing: by_pairing(dataset, &before),
+        fitted_by_pairing: by_pairing(dataset, &after),
+        outliers: outliers(dataset, &after),
+        neighbour_correlation: neighbour_correlation(dataset, &after),
         cross_validation: cross_validate(design, &measurements, &free, &lm),
-        residuals_m: residuals_after_m,
+        residuals: after,
         uncertainty,
         solution,
     })
@@ -181,7 +203,7 @@ fn fitted_parameters(
     fitted: &Chain<f64>,
     free: &FreeParameters,
     uncertainty: &Uncertainty,
-    reasons: Vec<Option<String>>,
+    reasons: Vec<Option<Held>>,
 ) -> Vec<FittedParameter> {
     let std_of = |index: usize| {
         let position = free.indices().position(|free| free == index)?;
@@ -225,7 +247,7 @@ fn cross_validate(
     for fold in 0..folds {
         let (kept, left_out) = part(folds, fold);
         let kinematics = Kinematics::new(&solve(design, &kept, free, lm).chain);
-        squares += left_out.iter().map(|measurement| kinematics.residual(measurement).powi(2)).sum::<f64>();
+        squares += left_out.iter().map(|measurement| measurement.weight * kinematics.residual(measurement).powi(2)).sum::<f64>();
     }
     Some(CrossValidation { folds, rms_m: (squares / measurements.len() as f64).sqrt() })
 }

@@ -1,8 +1,9 @@
 //! Which parameters a fit leaves alone.
 
+use std::fmt;
 use std::str::FromStr;
 
-use ballbar::{Chain, FreeParameters, Parameter};
+use ballbar::{Chain, Parameter};
 use miette::Diagnostic;
 use thiserror::Error;
 
@@ -41,7 +42,7 @@ pub enum HoldError {
     ))]
     Unknown(String),
     /// Two rules.
-    #[error("`{0}` beside another of `auto`, `paper`, `none`")]
+    #[error("`{0}` stands beside another rule (`auto`, `paper` or `none`)")]
     #[diagnostic(help("Give one rule, and as many parameter names as you like: `--hold paper,x1`."))]
     TwoRules(String),
     /// A parameter that this robot does not have.
@@ -86,34 +87,51 @@ impl Hold {
         Self { rule: Rule::None, names: Vec::new() }
     }
 
-    /// Why each parameter is held; `None` for the free ones.
+    /// Parameters held by name.
     ///
     /// # Errors
     /// [`HoldError::NotOfThisRobot`] for a name beyond the chain's parameters.
-    pub fn reasons(&self, chain: &Chain<f64>, found: &Identifiability) -> Result<Vec<Option<String>>, HoldError> {
-        if let Some(&name) = self.names.iter().find(|name| name.index() >= chain.parameter_count()) {
-            return Err(HoldError::NotOfThisRobot(name));
+    pub fn names_of(&self, chain: &Chain<f64>) -> Result<&[Parameter], HoldError> {
+        match self.names.iter().find(|name| name.index() >= chain.parameter_count()) {
+            Some(&name) => Err(HoldError::NotOfThisRobot(name)),
+            None => Ok(&self.names),
         }
+    }
+
+    /// Why each parameter is held; `None` for the free ones.
+    pub fn reasons(&self, chain: &Chain<f64>, found: &Identifiability) -> Vec<Option<Held>> {
         let reason = |(index, finding): (usize, &Finding)| {
             let parameter = Parameter::from_index(index);
-            if self.names.contains(&parameter) {
-                return Some("held by name".to_owned());
-            }
             match self.rule {
-                Rule::Auto if *finding != Finding::Identified => Some(finding.to_string()),
-                Rule::Paper if chain.is_conventionally_held(parameter) => Some("held in the paper".to_owned()),
+                _ if self.names.contains(&parameter) => Some(Held::ByName),
+                Rule::Auto if *finding != Finding::Identified => Some(Held::Finding(finding.clone())),
+                Rule::Paper if chain.is_conventionally_held(parameter) => Some(Held::AsInPaper),
                 Rule::Auto | Rule::Paper | Rule::None => None,
             }
         };
-        Ok(found.findings.iter().enumerate().map(reason).collect())
+        found.findings.iter().enumerate().map(reason).collect()
     }
 }
 
-/// The free parameters of a list of reasons.
-pub(super) fn free_parameters(reasons: &[Option<String>]) -> FreeParameters {
-    let indices = (0..reasons.len()).filter(|&index| reasons[index].is_none());
-    // Ascending and in range by construction, so this cannot fail.
-    FreeParameters::from_indices(indices).unwrap_or_else(|_| FreeParameters::all(0))
+/// Why a parameter stays at its design value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Held {
+    /// `--hold` names it.
+    ByName,
+    /// `--hold paper`, and the paper holds it.
+    AsInPaper,
+    /// `--hold auto`, and the poses do not identify it.
+    Finding(Finding),
+}
+
+impl fmt::Display for Held {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ByName => f.write_str("by name"),
+            Self::AsInPaper => f.write_str("as in the paper"),
+            Self::Finding(finding) => finding.fmt(f),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -13,14 +13,14 @@ use super::spectrum::{RANK_THRESHOLD, Spectrum, column_scales, is_zero_column};
 use crate::files::JointLimits;
 use crate::units::ScreenUnit;
 
-/// How far a design value may plausibly be off: 5 mm, 0.5°, 0.5 %. A parameter whose standard deviation from these poses alone
+/// How far a design value may plausibly be off, SI: 5 mm, 0.5°, 0.5 %. A parameter whose standard deviation from these poses
 /// would exceed this is better left at its design value, which tells more than the poses do.
-pub const PLAUSIBLE_ERROR: [(ParameterUnit, f64); 3] =
-    [(ParameterUnit::Metre, 5e-3), (ParameterUnit::Radian, 0.5 * std::f64::consts::PI / 180.0), (ParameterUnit::One, 5e-3)];
-
-/// [`PLAUSIBLE_ERROR`] of a parameter, SI.
 pub fn plausible_error(unit: ParameterUnit) -> f64 {
-    PLAUSIBLE_ERROR.iter().find(|(of, _)| *of == unit).map_or(1.0, |&(_, error)| error)
+    match unit {
+        ParameterUnit::Metre => 5e-3,
+        ParameterUnit::Radian => 0.5_f64.to_radians(),
+        ParameterUnit::One => 5e-3,
+    }
 }
 
 /// What the poses say of one parameter.
@@ -28,6 +28,8 @@ pub fn plausible_error(unit: ParameterUnit) -> f64 {
 pub enum Finding {
     /// It belongs to the independent subset.
     Identified,
+    /// It is held by name, and the subset was chosen without it.
+    LeftOut,
     /// Whatever is measured at the tool, the parameters of the subset named here move it in the same way.
     Redundant {
         /// Those that mimic it, strongest first.
@@ -52,10 +54,11 @@ pub enum Finding {
 }
 
 impl Finding {
-    /// A word for machines: `identified`, `redundant`, `not_excited`, `no_effect`, `weak`.
+    /// A word for machines: `identified`, `left_out`, `redundant`, `not_excited`, `no_effect`, `weak`.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Identified => "identified",
+            Self::LeftOut => "left_out",
             Self::Redundant { .. } => "redundant",
             Self::NotExcited { .. } => "not_excited",
             Self::NoEffect => "no_effect",
@@ -68,6 +71,7 @@ impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Identified => f.write_str("identified"),
+            Self::LeftOut => f.write_str("left out by name"),
             Self::Redundant { with } => write!(f, "redundant with {}", list(with)),
             Self::NotExcited { with } => write!(f, "not excited: in these poses it acts like {}", list(with)),
             Self::NoEffect => f.write_str("not excited: no length of these poses changes with it"),
@@ -110,21 +114,20 @@ pub struct Identifiability {
     /// RMS of what no linear change of the independent parameters explains, metres: the noise as the data show it. Zero when
     /// there are no more rows than independent parameters.
     pub noise_m: f64,
-    /// Rows seen.
-    pub rows: usize,
 }
 
 impl Identifiability {
-    /// Judges all parameters of `chain` by the weighted Jacobian at its present values.
-    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits]) -> Self {
+    /// Judges all parameters of `chain` by the weighted Jacobian at its present values. The subset is chosen around the
+    /// parameters in `held`, which are not free whatever the poses say.
+    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], held: &[Parameter]) -> Self {
         let rows = measurements.len();
         let observation = Observation::new(chain, measurements);
         let spectrum = Spectrum::new(&observation.jacobian);
-        let independent = independent_columns(chain, &observation.jacobian, spectrum.rank);
+        let independent = independent_columns(chain, &observation.jacobian, spectrum.rank, held);
         let noise_m = unexplained_rms(&observation, &independent, rows);
 
         let reference = reference_jacobian(chain, limits);
-        let always_independent = independent_columns(chain, &reference, Spectrum::new(&reference).rank);
+        let always_independent = independent_columns(chain, &reference, Spectrum::new(&reference).rank, held);
 
         let mut findings = vec![Finding::Identified; chain.parameter_count()];
         for (index, std) in weak_columns(chain, &observation.jacobian, &independent, noise_m) {
@@ -133,15 +136,17 @@ impl Identifiability {
         }
         let largest = observation.jacobian.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
         for index in (0..chain.parameter_count()).filter(|index| !independent.contains(index)) {
-            findings[index] = if is_zero_column(observation.jacobian.column(index).norm(), largest) {
-                Finding::NoEffect
-            } else if always_independent.contains(&index) {
-                Finding::NotExcited { with: mimics(&observation.jacobian, &independent, index) }
-            } else {
+            findings[index] = if held.contains(&Parameter::from_index(index)) {
+                Finding::LeftOut
+            } else if !always_independent.contains(&index) {
                 Finding::Redundant { with: mimics(&reference, &always_independent, index) }
+            } else if is_zero_column(observation.jacobian.column(index).norm(), largest) {
+                Finding::NoEffect
+            } else {
+                Finding::NotExcited { with: mimics(&observation.jacobian, &independent, index) }
             };
         }
-        Self { spectrum, findings, noise_m, rows }
+        Self { spectrum, findings, noise_m }
     }
 
     /// The parameters that the data identify, ascending.
@@ -151,15 +156,16 @@ impl Identifiability {
 
     /// The parameters that the data do not identify, with the reason.
     pub fn not_identified(&self) -> impl Iterator<Item = (Parameter, &Finding)> + '_ {
-        let findings = self.findings.iter().enumerate().filter(|(_, finding)| **finding != Finding::Identified);
+        let findings =
+            self.findings.iter().enumerate().filter(|(_, finding)| !matches!(finding, Finding::Identified | Finding::LeftOut));
         findings.map(|(index, finding)| (Parameter::from_index(index), finding))
     }
 }
 
 /// A largest independent subset of the columns, ascending: first as many as possible of those that the paper leaves free, then
 /// of those it holds. In each group in the order of what the scaled columns add, the second group after what the first explains.
-fn independent_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, rank: usize) -> Vec<usize> {
-    let all = 0..chain.parameter_count();
+fn independent_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, rank: usize, held: &[Parameter]) -> Vec<usize> {
+    let all = (0..chain.parameter_count()).filter(|&index| !held.contains(&Parameter::from_index(index)));
     let (held, free): (Vec<_>, Vec<_>) = all.partition(|&index| chain.is_conventionally_held(Parameter::from_index(index)));
     let scales = column_scales(jacobian);
     let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| jacobian[(row, column)] / scales[column]);

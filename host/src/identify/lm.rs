@@ -22,7 +22,7 @@ impl Default for LmOptions {
 pub enum Status {
     /// A minimum was reached, and the parameters moved.
     Converged(ConvergenceTest),
-    /// The start already met the gradient test: nothing moved.
+    /// The start already met the gradient test, or fits to a nanometre: nothing moved.
     AlreadyOptimal,
     /// No damping, however strong, lowered the cost, yet the gradient test is not met.
     Stalled,
@@ -39,9 +39,10 @@ pub enum Status {
 pub enum ConvergenceTest {
     /// The residual is orthogonal to every free column: the largest cosine is below 1e-10.
     Gradient,
-    /// The last step lowered, and the next one would lower, the cost by less than 1e-12 of it.
+    /// The last step lowered, and the next one would lower, the cost by less than 1e-12 of it; or the next one promises less
+    /// than 1e-11 of it and summing the cost rounds that off.
     Cost,
-    /// The next step would change the lengths by less than 1e-14 m RMS: rounding.
+    /// The next step would change the lengths by less than 1e-12 m RMS: a picometre, less than any bar can tell.
     Step,
 }
 
@@ -68,13 +69,13 @@ impl Status {
         match self {
             Self::Converged(ConvergenceTest::Gradient) => "the residuals are orthogonal to every free parameter's effect",
             Self::Converged(ConvergenceTest::Cost) => "a further step would no longer lower the sum of squares",
-            Self::Converged(ConvergenceTest::Step) => "a further step would change the lengths by rounding only",
+            Self::Converged(ConvergenceTest::Step) => "a further step would change the lengths by less than a picometre",
             Self::AlreadyOptimal => "the start was the minimum already: no parameter moved",
             Self::Stalled => {
                 "no step lowered the sum of squares although its gradient is not zero; hold parameters that are weakly excited, or look for wrong rows"
             }
             Self::NothingObservable => {
-                "no length depends on a parameter that is free; measure other poses or hold fewer parameters"
+                "no parameter is free, or no length depends on a free one; measure other poses, look for wrong rows, or hold fewer parameters"
             }
             Self::IterationLimit => {
                 "the steps were used up before a minimum was reached; hold more parameters (--hold auto chooses them)"
@@ -99,7 +100,11 @@ pub struct Solution {
 
 const GRADIENT_TOLERANCE: f64 = 1e-10;
 const COST_TOLERANCE: f64 = 1e-12;
-const STEP_TOLERANCE_M: f64 = 1e-14;
+const STEP_TOLERANCE_M: f64 = 1e-12;
+/// Below a nanometre residuals are the rounding of a file's digits, and a start that has them is the minimum already.
+const ROUNDED_RMS_M: f64 = 1e-9;
+/// A column whose squared norm is below this fraction of what a translation's would be (the sum of weights) is rounding.
+const ZERO_COLUMN: f64 = 1e-24;
 /// λ at the start, relative to the largest diagonal entry (λI) or as it is (λ·diag). Designs are good starts, so it is small;
 /// a refused step raises it.
 const FIRST_LAMBDA: f64 = 1e-6;
@@ -159,8 +164,11 @@ impl<'a> Solver<'a> {
         if !self.equations.cost().is_finite() {
             return Status::NotFinite;
         }
-        if largest_diagonal(&self.equations) == 0.0 {
+        if largest_diagonal(&self.equations) <= ZERO_COLUMN * self.equations.weight() {
             return Status::NothingObservable;
+        }
+        if self.rms_history_m[0] < ROUNDED_RMS_M {
+            return Status::AlreadyOptimal;
         }
         let mut last_reduction = f64::INFINITY;
         loop {
@@ -253,11 +261,11 @@ fn largest_diagonal(equations: &NormalEquations<f64>) -> f64 {
 
 /// Largest cosine of an angle between the residual vector and a free column.
 fn largest_cosine(equations: &NormalEquations<f64>) -> f64 {
-    let largest = largest_diagonal(equations);
+    let largest = largest_diagonal(equations).max(equations.weight());
     let cosines = diagonal(equations).zip(equations.gradient()).map(|(square, gradient)| {
         let size = (square * equations.cost()).sqrt();
         // A column of rounding has no direction.
-        if square > 1e-24 * largest && size > 0.0 { gradient.abs() / size } else { 0.0 }
+        if square > ZERO_COLUMN * largest && size > 0.0 { gradient.abs() / size } else { 0.0 }
     });
     cosines.fold(0.0, f64::max)
 }

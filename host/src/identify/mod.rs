@@ -22,14 +22,14 @@ mod spectrum;
 mod uncertainty;
 
 pub use advice::{bound_by_ends, bound_by_pairings, remarks};
-pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, fit};
-pub use hold::{Hold, HoldError};
-pub use identifiability::{Finding, Identifiability, PLAUSIBLE_ERROR, plausible_error};
+pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, Objection, fit};
+pub use hold::{Held, Hold, HoldError};
+pub use identifiability::{Finding, Identifiability, plausible_error};
 pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
 pub use normality::{AndersonDarling, anderson_darling};
 pub use observation::Observation;
 pub use residuals::{
-    Outlier, OutlierTest, PairingResiduals, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals_m,
+    Outlier, OutlierTest, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
 };
 pub use spectrum::{RANK_THRESHOLD, Spectrum};
 pub use uncertainty::Uncertainty;

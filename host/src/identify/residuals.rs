@@ -2,7 +2,23 @@
 
 use ballbar::{Chain, Kinematics};
 
-use crate::files::{Dataset, PairingId};
+use crate::files::{Dataset, PairingId, PoseRow};
+
+/// A residual `f = d_measured − d_computed` and its weight, 1 on average.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// Metres.
+    pub value_m: f64,
+    /// Weight of its square.
+    pub weight: f64,
+}
+
+impl Residual {
+    /// `√w f`: all of these scatter alike, metres.
+    fn whitened_m(self) -> f64 {
+        self.weight.sqrt() * self.value_m
+    }
+}
 
 /// Size of a set of residuals, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,14 +34,14 @@ pub struct ResidualSummary {
 }
 
 impl ResidualSummary {
-    /// Summarises residuals (unweighted).
-    pub fn new(residuals_m: &[f64]) -> Self {
-        let count = residuals_m.len() as f64;
+    /// Summarises residuals; RMS and mean are weighted (all weights alike: the plain ones).
+    pub fn new(residuals: &[Residual]) -> Self {
+        let weight: f64 = residuals.iter().map(|f| f.weight).sum();
         Self {
-            count: residuals_m.len(),
-            rms_m: (residuals_m.iter().map(|f| f * f).sum::<f64>() / count).sqrt(),
-            mean_m: residuals_m.iter().sum::<f64>() / count,
-            max_abs_m: residuals_m.iter().fold(0.0, |largest, f| largest.max(f.abs())),
+            count: residuals.len(),
+            rms_m: (residuals.iter().map(|f| f.weight * f.value_m * f.value_m).sum::<f64>() / weight).sqrt(),
+            mean_m: residuals.iter().map(|f| f.weight * f.value_m).sum::<f64>() / weight,
+            max_abs_m: residuals.iter().fold(0.0, |largest, f| largest.max(f.value_m.abs())),
         }
     }
 }
@@ -39,16 +55,17 @@ pub struct PairingResiduals {
     pub summary: ResidualSummary,
 }
 
-/// Residuals `f = d_measured − d_computed` of all rows, metres.
-pub fn residuals_m(chain: &Chain<f64>, dataset: &Dataset) -> Vec<f64> {
+/// Residuals of all rows.
+pub fn residuals(chain: &Chain<f64>, dataset: &Dataset) -> Vec<Residual> {
     let kinematics = Kinematics::new(chain);
-    dataset.rows.iter().map(|row| kinematics.residual(&row.measurement)).collect()
+    let of = |row: &PoseRow| Residual { value_m: kinematics.residual(&row.measurement), weight: row.measurement.weight };
+    dataset.rows.iter().map(of).collect()
 }
 
 /// Summaries by pairing, in the rig's order.
-pub fn by_pairing(dataset: &Dataset, residuals_m: &[f64]) -> Vec<PairingResiduals> {
-    let of = |pairing: PairingId| -> Vec<f64> {
-        dataset.rows.iter().zip(residuals_m).filter(|(row, _)| row.pairing == pairing).map(|(_, &f)| f).collect()
+pub fn by_pairing(dataset: &Dataset, residuals: &[Residual]) -> Vec<PairingResiduals> {
+    let of = |pairing: PairingId| -> Vec<Residual> {
+        dataset.rows.iter().zip(residuals).filter(|(row, _)| row.pairing == pairing).map(|(_, &f)| f).collect()
     };
     let summarise = |pairing| PairingResiduals { pairing, summary: ResidualSummary::new(&of(pairing)) };
     dataset.pairings().into_iter().map(summarise).collect()
@@ -76,15 +93,16 @@ pub struct Outlier {
 
 /// Residuals beyond this many robust standard deviations stand out: one in 1.7 million of normal ones.
 const OUTLIER_SCORE: f64 = 5.0;
-/// Neighbours on either side (Hampel's identifier).
+/// Neighbours on either side, as in Hampel's identifier; the spread is that of all rows, since eleven give a poor one.
 const NEIGHBOURS: usize = 5;
-/// Below this spread residuals are rounding, and nothing stands out.
-const SMALLEST_SPREAD_M: f64 = 1e-12;
+/// Below this spread, a nanometre, residuals are the rounding of a file's digits, and nothing stands out.
+const SMALLEST_SPREAD_M: f64 = 1e-9;
 
 /// Rows that stand out from all others or from their neighbours of the same pairing, the worst first.
-pub fn outliers(dataset: &Dataset, residuals_m: &[f64]) -> Vec<Outlier> {
+pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
+    let residuals_m: &[f64] = &residuals.iter().map(|f| f.whitened_m()).collect::<Vec<_>>();
     let middle = median(residuals_m.to_vec());
-    let global = scores(&residuals_m.iter().map(|f| f - middle).collect::<Vec<_>>());
+    let global = scores(&residuals_m.iter().map(|f| Some(f - middle)).collect::<Vec<_>>());
     let local = scores(&deviations_from_neighbours(dataset, residuals_m));
     let rows = global.iter().zip(&local).enumerate();
     let mut outliers: Vec<Outlier> = rows
@@ -103,8 +121,9 @@ pub fn outliers(dataset: &Dataset, residuals_m: &[f64]) -> Vec<Outlier> {
 
 /// Correlation of each residual with the next one of the same pairing, in the order of measurement; `None` for fewer than
 /// twenty such neighbours. Independent noise gives `0 ± 1/√n`.
-pub fn neighbour_correlation(dataset: &Dataset, residuals_m: &[f64]) -> Option<f64> {
+pub fn neighbour_correlation(dataset: &Dataset, residuals: &[Residual]) -> Option<f64> {
     const FEWEST: usize = 20;
+    let residuals_m: Vec<f64> = residuals.iter().map(|f| f.whitened_m()).collect();
     let (mut products, mut squares, mut count) = (0.0, 0.0, 0);
     for pairing in dataset.pairings() {
         let rows = (0..residuals_m.len()).filter(|&i| dataset.rows[i].pairing == pairing);
@@ -116,29 +135,29 @@ pub fn neighbour_correlation(dataset: &Dataset, residuals_m: &[f64]) -> Option<f
     (count >= FEWEST && squares > 0.0).then(|| products / squares)
 }
 
-/// Each residual less the median of those around it, pairing by pairing, in the order of measurement.
-fn deviations_from_neighbours(dataset: &Dataset, residuals_m: &[f64]) -> Vec<f64> {
-    let mut deviations = vec![0.0; residuals_m.len()];
+/// Each residual less the median of those around it, pairing by pairing, in the order of measurement; `None` for a row with
+/// fewer than [`NEIGHBOURS`] around it.
+fn deviations_from_neighbours(dataset: &Dataset, residuals_m: &[f64]) -> Vec<Option<f64>> {
+    let mut deviations = vec![None; residuals_m.len()];
     for pairing in dataset.pairings() {
         let rows: Vec<usize> = (0..residuals_m.len()).filter(|&i| dataset.rows[i].pairing == pairing).collect();
         for (k, &row) in rows.iter().enumerate() {
             let window = rows[k.saturating_sub(NEIGHBOURS)..rows.len().min(k + NEIGHBOURS + 1)].iter();
             let around: Vec<f64> = window.filter(|&&other| other != row).map(|&other| residuals_m[other]).collect();
-            if !around.is_empty() {
-                deviations[row] = residuals_m[row] - median(around);
+            if around.len() >= NEIGHBOURS {
+                deviations[row] = Some(residuals_m[row] - median(around));
             }
         }
     }
     deviations
 }
 
-/// Deviations in units of their robust spread: 1.4826 times the median of their sizes, which is σ where they are normal.
-fn scores(deviations_m: &[f64]) -> Vec<f64> {
-    let spread = 1.4826 * median(deviations_m.iter().map(|d| d.abs()).collect());
-    if spread < SMALLEST_SPREAD_M {
-        return vec![0.0; deviations_m.len()];
-    }
-    deviations_m.iter().map(|d| d / spread).collect()
+/// Deviations in units of their robust spread: 1.4826 times the median of their sizes, which is σ where they are normal. Rows
+/// without a deviation score 0 and do not count.
+fn scores(deviations_m: &[Option<f64>]) -> Vec<f64> {
+    let spread = 1.4826 * median(deviations_m.iter().flatten().map(|d| d.abs()).collect());
+    let score = |deviation: &Option<f64>| if spread < SMALLEST_SPREAD_M { 0.0 } else { deviation.unwrap_or(0.0) / spread };
+    deviations_m.iter().map(score).collect()
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -27,8 +27,10 @@ impl Spectrum {
     /// Decomposes a Jacobian (n × k).
     pub fn new(jacobian: &DMatrix<f64>) -> Self {
         let columns = jacobian.ncols();
-        if columns == 0 {
-            return Self { singular_values: Vec::new(), rank: 0, scales: Vec::new(), right: DMatrix::zeros(0, 0) };
+        if columns == 0 || jacobian.iter().any(|entry| !entry.is_finite()) {
+            // Nothing to decompose, or nothing that can be: no direction counts.
+            let right = DMatrix::identity(columns, columns);
+            return Self { singular_values: vec![0.0; columns], rank: 0, scales: vec![1.0; columns], right };
         }
         let scales = column_scales(jacobian);
         let mut scaled = jacobian.clone();

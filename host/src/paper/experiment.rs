@@ -9,7 +9,8 @@ use super::stated;
 use super::stewart::{StewartPlatform, amplification};
 use crate::files::{Dataset, InputError, PoseRow, Rig, Robot};
 use crate::identify::{
-    AndersonDarling, Fit, FitError, FitOptions, Hold, Observation, ResidualSummary, Spectrum, anderson_darling, fit, residuals_m,
+    AndersonDarling, Fit, FitError, FitOptions, Hold, Observation, Residual, ResidualSummary, Spectrum, anderson_darling, fit,
+    residuals,
 };
 use crate::simulate::{ShellError, ShellPose, Shells, ToolError, tool_error};
 use crate::units::m_from_mm;
@@ -134,9 +135,9 @@ pub fn run(seed: u64, mut on_step: impl FnMut(f64)) -> Result<Experiment, Experi
     let fitted_chain = &fit.solution.chain;
     let platform = StewartPlatform { base_side_m: 0.2, plate_side_m: 0.1, bar_m: m_from_mm(stated::FITTED_RADIUS_MM) };
     Ok(Experiment {
-        other_radius: ResidualSummary::new(&residuals_m(fitted_chain, &other)),
-        normality: anderson_darling(&fit.residuals_m),
-        by_longitude: by_longitude(&fitted_shells, &fit.residuals_m),
+        other_radius: ResidualSummary::new(&residuals(fitted_chain, &other)),
+        normality: anderson_darling(&fit.residuals.iter().map(|f| f.value_m).collect::<Vec<_>>()),
+        by_longitude: by_longitude(&fitted_shells, &fit.residuals),
         noise_free_worst: worst_difference(noise_free.solution.chain.parameters(), truth.chain.parameters()),
         table_one,
         one_sphere: with_sphere_at(&design, &fitted_shells, rig.spheres[0].position_m),
@@ -156,14 +157,14 @@ fn dataset(poses: &[ShellPose]) -> Dataset {
     Dataset { rows: numbered.collect(), files: vec!["simulated".to_owned()] }
 }
 
-fn by_longitude(poses: &[ShellPose], residuals_m: &[f64]) -> Vec<Longitude> {
+fn by_longitude(poses: &[ShellPose], residuals: &[Residual]) -> Vec<Longitude> {
     const SLICES: usize = 12;
     let width = 360.0 / SLICES as f64;
     let slice = |i: usize| {
         let range = i as f64 * width..(i + 1) as f64 * width;
-        let inside = poses.iter().zip(residuals_m).filter(|(pose, _)| range.contains(&pose.longitude_rad.to_degrees()));
-        let residuals: Vec<f64> = inside.map(|(_, &f)| f).collect();
-        Longitude { from_deg: range.start, to_deg: range.end, summary: ResidualSummary::new(&residuals) }
+        let inside = poses.iter().zip(residuals).filter(|(pose, _)| range.contains(&pose.longitude_rad.to_degrees()));
+        let inside: Vec<Residual> = inside.map(|(_, &f)| f).collect();
+        Longitude { from_deg: range.start, to_deg: range.end, summary: ResidualSummary::new(&inside) }
     };
     (0..SLICES).map(slice).filter(|slice| slice.summary.count > 0).collect()
 }

@@ -10,7 +10,7 @@ use rand_distr::{Distribution, Normal};
 use thiserror::Error;
 
 use crate::files::{PairingId, PoseRow, Rig, Robot};
-use crate::units::mm_from_m;
+use crate::units::{mm_from_m, tidy};
 
 /// A simulated experiment: which shells, how many poses on each, and how noisy the bar is.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +29,7 @@ pub struct Shells<'a> {
     pub per_pairing: usize,
     /// Standard deviation of the lengths' normal noise, metres.
     pub sigma_m: f64,
-    /// The same seed gives the same poses and noise on every machine.
+    /// The same seed gives the same poses and noise, up to the last digits of the platform's sine.
     pub seed: u64,
 }
 
@@ -64,8 +64,9 @@ pub enum ShellError {
 
 /// Lowest elevation of the bar: below it, bar and table would meet.
 const LOWEST_LATITUDE_RAD: f64 = 10.0 * PI / 180.0;
-/// Starts of the inverse kinematics per wanted pose before a shell counts as out of reach.
+/// Starts of the inverse kinematics per pose found, and per pose of the first few, before a shell counts as out of reach.
 const STARTS_PER_POSE: usize = 400;
+const FIRST_POSES: usize = 10;
 
 impl Shells<'_> {
     /// Finds the poses and measures them; `on_pose` is called after each.
@@ -79,18 +80,16 @@ impl Shells<'_> {
         let planned = Kinematics::new(&self.planned_with.chain);
         let truth = Kinematics::new(&self.truth.chain);
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        // Noise has a stream of its own, so that the poses do not depend on its size.
+        // Noise has a stream of its own: its size changes no pose, as long as it keeps the length within the bar's travel.
         let mut noise_rng = ChaCha8Rng::seed_from_u64(self.seed);
         noise_rng.set_stream(1);
         let normal = Normal::new(0.0, self.sigma_m).ok();
 
         let mut poses = Vec::new();
         for &pairing in self.pairings {
-            let mut found = 0;
-            for _ in 0..STARTS_PER_POSE * self.per_pairing {
-                if found == self.per_pairing {
-                    break;
-                }
+            let (mut found, mut starts) = (0, 0);
+            while found < self.per_pairing && starts < STARTS_PER_POSE * (found + FIRST_POSES) {
+                starts += 1;
                 let noise_m = normal.map_or(0.0, |normal| normal.sample(&mut noise_rng));
                 if let Some(pose) = self.attempt(&planned, &truth, pairing, noise_m, &mut rng) {
                     poses.push(pose);
@@ -100,7 +99,12 @@ impl Shells<'_> {
             }
             if found < self.per_pairing {
                 let pairing = self.rig.pairing_name(pairing);
-                return Err(ShellError::OutOfReach { pairing, bar_mm: mm_from_m(self.bar_m), found, wanted: self.per_pairing });
+                return Err(ShellError::OutOfReach {
+                    pairing,
+                    bar_mm: tidy(mm_from_m(self.bar_m)),
+                    found,
+                    wanted: self.per_pairing,
+                });
             }
         }
         Ok(poses)
@@ -126,12 +130,12 @@ impl Shells<'_> {
         let q = self.reach(planned, start, &pairing.sphere_tool_m, &target_m)?;
         let length_m = truth.length(&q, &pairing) + noise_m;
         let within_travel = self.rig.bar.as_ref().is_none_or(|bar| (length_m - self.bar_m).abs() <= bar.travel_m / 2.0);
-        within_travel.then(|| ShellPose {
+        (within_travel && length_m > 0.0).then(|| ShellPose {
             row: PoseRow {
                 pairing: id,
                 measurement: ballbar::Measurement { pairing, q, length_m, weight: 1.0 },
                 sigma_m: None,
-                set: Some(format!("{}", mm_from_m(self.bar_m))),
+                set: Some(tidy(mm_from_m(self.bar_m)).to_string()),
                 t_s: None,
                 file: 0,
                 line: 0,
