@@ -148,8 +148,8 @@ fn fit_writes_a_robot_that_keeps_the_comments_and_that_every_command_reads() {
     let again = ["fit", "--robot", "calibrated.toml", "--rig", "triangles", "other.csv", "poses.csv", "--out", "calibrated.toml"];
     runs(&folder, &[&again]);
     let text = read(&folder, "calibrated.toml");
-    assert_eq!(text.matches("[calibration]").count(), 1);
-    assert_eq!(text.matches("The links and joints of this file hold fitted parameters").count(), 1);
+    assert_eq!(text.matches("\n[calibration]\n").count(), 1);
+    assert_eq!(text.matches("# CALIBRATED").count(), 1);
     assert!(
         text.contains("from_robot = \"calibrated.toml\"\nfrom_poses = [\"other.csv\", \"poses.csv\"]\nposes = 270\n"),
         "{text}"
@@ -169,7 +169,9 @@ fn a_fit_that_predicts_poses_left_out_worse_than_the_design_is_not_written() {
     assert_eq!((run.code, read(&folder, "old.toml").as_str()), (1, "older\n"));
     assert!(!run.stdout.contains("wrote"));
     let without_out = host_cal_in(folder.path(), &args[..8]);
-    assert_eq!((without_out.code, without_out.stdout), (1, run.stdout), "the exit code does not depend on --out");
+    let same = run.stdout.replace("old.toml was not written\n", "");
+    assert!(same.ends_with("NOT TO BE TRUSTED AS IT IS: poses left out of the fit are predicted no better than by the design\n"));
+    assert_eq!((without_out.code, without_out.stdout), (1, same), "the verdict does not depend on --out");
 }
 
 #[test]

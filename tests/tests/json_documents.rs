@@ -109,7 +109,7 @@ fn fit_documents_outliers_by_row_number_and_why_nothing_was_written() {
     runs(&folder, &[&["simulate"], &DESIGN, &noise]);
     let fit = document(&folder, 1, &[&["fit"], &DESIGN, &["noise.csv", "--hold", "paper", "--out", "calibrated.toml"]]);
     assert_eq!(fit["status"], "converged");
-    assert!(text(&fit["not_written_because"]).contains("left out"));
+    assert!(text(&fit["objection"]).contains("left out"));
     assert!(fit.get("out").is_none() && !folder.path().join("calibrated.toml").exists());
 }
 

@@ -101,9 +101,10 @@ const SMALLEST_SPREAD_M: f64 = 1e-9;
 /// Rows that stand out from all others or from their neighbours of the same pairing, the worst first.
 pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
     let residuals_m: &[f64] = &residuals.iter().map(|f| f.whitened_m()).collect::<Vec<_>>();
+    let stated_m = stated_spread_m(dataset);
     let middle = median(residuals_m.to_vec());
-    let global = scores(&residuals_m.iter().map(|f| Some(f - middle)).collect::<Vec<_>>());
-    let local = scores(&deviations_from_neighbours(dataset, residuals_m));
+    let global = scores(&residuals_m.iter().map(|f| Some(f - middle)).collect::<Vec<_>>(), stated_m);
+    let local = scores(&deviations_from_neighbours(dataset, residuals_m), stated_m);
     let rows = global.iter().zip(&local).enumerate();
     let mut outliers: Vec<Outlier> = rows
         .map(|(row, (&all, &neighbours))| {
@@ -152,10 +153,16 @@ fn deviations_from_neighbours(dataset: &Dataset, residuals_m: &[f64]) -> Vec<Opt
     deviations
 }
 
-/// Deviations in units of their robust spread: 1.4826 times the median of their sizes, which is σ where they are normal. Rows
-/// without a deviation score 0 and do not count.
-fn scores(deviations_m: &[Option<f64>]) -> Vec<f64> {
-    let spread = 1.4826 * median(deviations_m.iter().flatten().map(|d| d.abs()).collect());
+/// What `sigma_mm` says the `√w f` scatter by, metres: the same for all rows. 0 where it is not given.
+fn stated_spread_m(dataset: &Dataset) -> f64 {
+    let spread = |row: &PoseRow| row.sigma_m.map_or(0.0, |sigma| sigma * row.measurement.weight.sqrt());
+    dataset.rows.first().map_or(0.0, spread)
+}
+
+/// Deviations in units of their robust spread: 1.4826 times the median of their sizes, which is σ where they are normal, but no
+/// less than what is stated. Rows without a deviation score 0 and do not count.
+fn scores(deviations_m: &[Option<f64>], stated_m: f64) -> Vec<f64> {
+    let spread = stated_m.max(1.4826 * median(deviations_m.iter().flatten().map(|d| d.abs()).collect()));
     let score = |deviation: &Option<f64>| if spread < SMALLEST_SPREAD_M { 0.0 } else { deviation.unwrap_or(0.0) / spread };
     deviations_m.iter().map(score).collect()
 }
