@@ -18,7 +18,7 @@ fn snapshot(name: &str, command: &[&str], text: &str) {
         omit_expression => true,
         filters => vec![
             (r#"when = "\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ""#, "when = [TIME]"),
-            (r"\b\de-1[4-9]\b", "[ROUNDING]"),
+            (r"\b\de-1[0-9]\b", "[ROUNDING]"),
             (r"(\d\.\d{6})\d{4,}", "$1…"),
         ],
     }, {
