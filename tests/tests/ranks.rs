@@ -3,7 +3,7 @@
 use ballbar::{Chain, JointKind, Measurement, Pairing, Vector3};
 use ballbar_tests::experiment::Puma;
 use host_cal::files::JointLimits;
-use host_cal::identify::{Finding, Identifiability, Observation, Spectrum, bound_by_ends};
+use host_cal::identify::{Finding, Identifiability, Observation, Spectrum, bound_by_ends, bound_by_pairings, remarks};
 use host_cal::paper::PairingRanks;
 use proptest::prelude::*;
 
@@ -123,4 +123,18 @@ fn more_copies_of_one_pose_do_not_raise_the_rank() {
     let copies: Vec<_> = rows.iter().cycle().take(90).copied().collect();
     rows.extend(copies);
     assert_eq!(Spectrum::new(&Observation::new(&puma.design.chain, &rows).jacobian).rank, 9);
+}
+
+#[test]
+fn chucks_in_one_line_count_as_two_and_the_advice_says_so() {
+    let puma = Puma::default();
+    let mut poses = puma.shells(0.46, 20, 0.0, 1);
+    let (first_m, second_m) = (puma.rig.chucks[0].position_m, puma.rig.chucks[1].position_m);
+    for row in poses.rows.iter_mut().filter(|row| row.pairing.chuck == 2) {
+        row.measurement.pairing.chuck_base_m = (first_m + second_m) / 2.0;
+    }
+    assert_eq!(bound_by_pairings(&puma.design.chain, &poses), 35);
+    assert_eq!(Spectrum::new(&Observation::new(&puma.design.chain, &poses.measurements()).jacobian).rank, 35);
+    let advice = remarks(&puma.design.chain, &poses, &puma.rig, &puma.design.limits).join(" ");
+    assert!(advice.contains("All lengths begin at 3 chucks in one line"), "{advice}");
 }

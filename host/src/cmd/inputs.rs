@@ -60,11 +60,7 @@ fn summarise(dataset: &Dataset, warnings: &[(usize, RowWarning)]) -> Vec<String>
     const SHOWN: usize = 5;
     let mut kinds: Vec<(String, Vec<usize>)> = Vec::new();
     for (row, warning) in warnings {
-        let text = match warning {
-            RowWarning::Repeated { .. } => "repeat an earlier row".to_owned(),
-            RowWarning::BeyondTravel => "have a length beyond the bar's travel".to_owned(),
-            RowWarning::BeyondLimits { joint } => format!("have joint {joint} beyond its limits"),
-        };
+        let text = warning.to_string();
         match kinds.iter_mut().find(|(kind, _)| *kind == text) {
             Some((_, rows)) => rows.push(*row),
             None => kinds.push((text, vec![*row])),

@@ -1,6 +1,6 @@
 //! `poses.csv`: measured lengths and where the robot stood. `read_poses.rs` reads one file of them.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::fmt;
 
 use ballbar::{JointKind, Measurement};
@@ -48,18 +48,16 @@ pub enum RowWarning {
     /// No extension of the bar has this length within its travel.
     BeyondTravel,
     /// The same row, measured values and all, stands there before.
-    Repeated {
-        /// Number of that row, from 1.
-        of_row: usize,
-    },
+    Repeated,
 }
 
 impl fmt::Display for RowWarning {
+    /// What is said of several such rows: `poses that …`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::BeyondLimits { joint } => write!(f, "joint {joint} is beyond its limits"),
-            Self::BeyondTravel => f.write_str("the length is beyond the bar's travel"),
-            Self::Repeated { of_row } => write!(f, "the same as row {of_row}"),
+            Self::BeyondLimits { joint } => write!(f, "have joint {joint} beyond its limits"),
+            Self::BeyondTravel => f.write_str("have a length beyond the bar's travel"),
+            Self::Repeated => f.write_str("repeat an earlier row (and weigh twice)"),
         }
     }
 }
@@ -86,7 +84,7 @@ impl Dataset {
     /// Rows that may be mistakes: beyond joint limits, beyond the bar's travel, or repeated. Row indices from 0.
     pub fn warnings(&self, robot: &Robot, rig: &Rig) -> Vec<(usize, RowWarning)> {
         let mut warnings = Vec::new();
-        let mut seen: HashMap<(PairingId, Vec<u64>), usize> = HashMap::new();
+        let mut seen = HashSet::new();
         for (i, row) in self.rows.iter().enumerate() {
             let q = row.measurement.q.as_array();
             for (joint, (limits, &q)) in robot.limits.iter().zip(q).enumerate() {
@@ -97,12 +95,9 @@ impl Dataset {
             if rig.bar.as_ref().is_some_and(|bar| !bar.reaches(row.measurement.length_m)) {
                 warnings.push((i, RowWarning::BeyondTravel));
             }
-            let bits = q.iter().chain([&row.measurement.length_m]).map(|value| value.to_bits()).collect();
-            if let Some(&first) = seen.get(&(row.pairing, bits)) {
-                warnings.push((i, RowWarning::Repeated { of_row: first + 1 }));
-            } else {
-                let bits = q.iter().chain([&row.measurement.length_m]).map(|value| value.to_bits()).collect();
-                seen.insert((row.pairing, bits), i);
+            let bits: Vec<u64> = q.iter().chain([&row.measurement.length_m]).map(|value| value.to_bits()).collect();
+            if !seen.insert((row.pairing, bits)) {
+                warnings.push((i, RowWarning::Repeated));
             }
         }
         warnings
