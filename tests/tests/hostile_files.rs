@@ -1,12 +1,12 @@
 //! Files with bytes changed at random: a reader takes them or says what is wrong, and never panics.
 
 #[expect(dead_code, reason = "refusals are counted elsewhere")]
-mod bench;
+mod workbench;
 
-use bench::{Bench, POSES, RIG, ROBOT};
 use host_cal::files::{Calibration, Dataset, InputError, Rig, Robot, Source, write_poses};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use workbench::{POSES, RIG, ROBOT, Workbench};
 
 const MUTANTS: usize = 2_000;
 
@@ -182,7 +182,7 @@ fn the_command_shows_what_is_wrong_with_a_mutant_without_a_panic() {
     let mut rng = ChaCha8Rng::seed_from_u64(560);
     let args = ["validate", "--robot", "robot.toml", "--rig", "rig.toml", "poses.csv"];
     for (file, text) in [("robot.toml", ROBOT), ("rig.toml", RIG), ("poses.csv", &full_poses())] {
-        let bench = Bench::new();
+        let bench = Workbench::new();
         for _ in 0..100 {
             let bytes = mutant(&mut rng, text);
             bench.put(file, &bytes);

@@ -13,6 +13,10 @@ use rand_chacha::ChaCha8Rng;
 
 const ROBOTS: [&str; 2] = ["puma560", "puma560-optimised"];
 
+/// 1 µm is required. The numbers are the same to the bit everywhere, so that half of it can be asked for; with it, a loss such
+/// as that of the last part of π/2 in the sine's range reduction (0.56 µm) shows.
+const LARGEST_ERROR_M: f64 = 0.5e-6;
+
 /// Both precisions of a robot.
 struct Both {
     f64: Kinematics<f64>,
@@ -53,8 +57,8 @@ fn the_tool_pose_in_f32_is_within_a_micrometre() {
             worst_rotation = worse(worst_rotation, (rounded.rotation.map(f64::from) - exact.rotation).norm());
         });
         println!("{name}: {:.3} µm, rotation {worst_rotation:.2e}", worst_m * 1e6);
-        assert!(worst_m <= 1e-6, "{name}: {:.3} µm", worst_m * 1e6);
-        assert!(worst_rotation <= 2e-6, "{name}: {worst_rotation:e}");
+        assert!(worst_m <= LARGEST_ERROR_M, "{name}: {:.3} µm", worst_m * 1e6);
+        assert!(worst_rotation <= 1.25e-6, "{name}: {worst_rotation:e}");
     }
 }
 
@@ -72,7 +76,7 @@ fn a_sphere_in_f32_is_within_a_micrometre() {
             }
         });
         println!("{name}: sphere {:.3} µm", worst_m * 1e6);
-        assert!(worst_m <= 1e-6, "{name}: {:.3} µm", worst_m * 1e6);
+        assert!(worst_m <= LARGEST_ERROR_M, "{name}: {:.3} µm", worst_m * 1e6);
     }
 }
 
@@ -104,8 +108,8 @@ fn lengths_and_gradient_rows_in_f32_are_close_to_those_in_f64() {
             }
         });
         println!("{name}: length {:.3} µm, row {worst:.2e}, scale columns {worst_of_scales:.2e}", worst_m * 1e6);
-        assert!(worst_m <= 1e-6, "{name}: {:.3} µm", worst_m * 1e6);
-        assert!(worst <= 2e-6 && worst_of_scales <= 4e-6, "{name}: {worst:e}, scale columns {worst_of_scales:e}");
+        assert!(worst_m <= LARGEST_ERROR_M, "{name}: {:.3} µm", worst_m * 1e6);
+        assert!(worst <= 1.5e-6 && worst_of_scales <= 3e-6, "{name}: {worst:e}, scale columns {worst_of_scales:e}");
     }
 }
 

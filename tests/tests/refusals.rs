@@ -1,10 +1,10 @@
 //! Every file that `host-cal` refuses or warns of: what it says, and that it leaves the disk as it was.
 
-mod bench;
+mod workbench;
 
 use std::fs;
 
-use bench::{Bench, POSES, RIG, ROBOT, snapshot};
+use workbench::{POSES, RIG, ROBOT, Workbench, snapshot};
 
 const FIT: [&str; 8] = ["fit", "--robot", "robot.toml", "--rig", "rig.toml", "poses.csv", "--out", "old.toml"];
 const VALIDATE: [&str; 6] = ["validate", "--robot", "robot.toml", "--rig", "rig.toml", "poses.csv"];
@@ -13,7 +13,7 @@ const VALIDATE: [&str; 6] = ["validate", "--robot", "robot.toml", "--rig", "rig.
 fn refuses_files(file: &str, good: &str, changes: &[(&str, &str, &str)]) {
     for (name, from, to) in changes {
         assert!(good.contains(from), "{name}: the good file has no {from}");
-        let bench = Bench::new();
+        let bench = Workbench::new();
         bench.put(file, if from.is_empty() { (*to).to_owned() } else { good.replacen(from, to, 1) });
         bench.refuses(name, &FIT);
         assert!(bench.run(&FIT).stderr.starts_with(&format!("  × {file}")), "{name}: refused, but not for its own file");
@@ -22,7 +22,7 @@ fn refuses_files(file: &str, good: &str, changes: &[(&str, &str, &str)]) {
 
 #[test]
 fn the_files_that_the_refused_ones_are_made_of_are_accepted_without_a_warning() {
-    let run = Bench::new().run(&VALIDATE);
+    let run = Workbench::new().run(&VALIDATE);
     assert_eq!((run.code, run.stderr.as_str()), (0, ""));
 }
 
@@ -151,7 +151,7 @@ fn bad_poses_are_refused_with_their_line_and_column() {
 #[test]
 fn a_file_that_cannot_be_read_as_text_is_refused() {
     for (file, what) in [("robot.toml", "robot"), ("rig.toml", "rig"), ("poses.csv", "poses")] {
-        let bench = Bench::new();
+        let bench = Workbench::new();
         bench.put(file, b"caf\xe9 = \"\xff\"\n");
         bench.refuses(&format!("{what}_that_is_not_utf8"), &FIT);
         fs::remove_file(bench.path(file)).expect("it was there");
@@ -163,14 +163,14 @@ fn a_file_that_cannot_be_read_as_text_is_refused() {
 
 #[test]
 fn weights_for_some_poses_only_are_refused() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     bench.put("weighed.csv", "chuck,sphere,q1_deg,q2_mm,length_mm,sigma_mm\nA,1,10.0,100.0,455.5,0.1\n");
     bench.refuses("sigma_in_the_second_file_only", &[&VALIDATE[..], &["weighed.csv"]].concat());
 }
 
 #[test]
 fn rows_that_may_be_mistakes_are_warned_of_once_a_kind_and_used() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     let rows = "A,1,10.0,100.0,455.5\nA,1,171.0,100.0,455.5\nB,2,-170.5,600.0,455.5\nB,2,0.0,0.0,530.0\nB,1,30.0,200.0,610.125\n";
     bench.put("doubtful.csv", format!("{POSES}{rows}"));
     let many = "A,1,10.0,-0.5,460.0\n".repeat(7);
@@ -203,7 +203,7 @@ fn a_vector_of_four_numbers_is_refused() {
         ("robot.toml", ROBOT, "[0.0, 90.0, 0.0]", "[0.0, 90.0, 0.0, 7.0]"),
         ("rig.toml", RIG, "[565.0, 0.0, 0.0]", "[565.0, 0.0, 0.0, 7.0]"),
     ] {
-        let bench = Bench::new();
+        let bench = Workbench::new();
         bench.put(file, good.replacen(from, to, 1));
         assert!(bench.fails(2, &VALIDATE).starts_with(&format!("  × {file}")));
     }
@@ -212,7 +212,7 @@ fn a_vector_of_four_numbers_is_refused() {
 #[test]
 fn a_name_that_a_row_of_poses_cannot_hold_is_refused() {
     for name in ["B\\rC", "B\\tC", "\\u001b[31mB"] {
-        let bench = Bench::new();
+        let bench = Workbench::new();
         bench.put("rig.toml", RIG.replacen("\"B\"", &format!("\"{name}\""), 1));
         assert!(bench.fails(2, &VALIDATE).starts_with("  × rig.toml:6"));
     }
@@ -220,7 +220,7 @@ fn a_name_that_a_row_of_poses_cannot_hold_is_refused() {
 
 #[test]
 fn a_quote_that_is_never_closed_is_refused() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     let rows = "chuck,sphere,q1_deg,q2_mm,length_mm,set\nA,1,10.0,100.0,455.5,\"shell\nA,2,-20.0,150.0,460.25,shell\n";
     bench.put("poses.csv", rows);
     assert!(bench.fails(2, &VALIDATE).starts_with("  × poses.csv:2"));
@@ -228,7 +228,7 @@ fn a_quote_that_is_never_closed_is_refused() {
 
 #[test]
 fn a_line_of_white_space_is_skipped_or_refused_where_it_stands() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     bench.put("poses.csv", POSES.replacen("A,2", "   \nA,2", 1));
     let run = bench.run(&VALIDATE);
     assert!(run.code == 0 || run.stderr.starts_with("  × poses.csv:4"), "{}", run.transcript());
@@ -236,7 +236,7 @@ fn a_line_of_white_space_is_skipped_or_refused_where_it_stands() {
 
 #[test]
 fn lines_that_end_by_a_carriage_return_alone_are_counted() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     bench.put("poses.csv", POSES.replace("460.25", "nan").replace('\n', "\r"));
     assert!(bench.fails(2, &VALIDATE).starts_with("  × poses.csv:4"));
 }

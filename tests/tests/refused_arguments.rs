@@ -1,14 +1,14 @@
 //! Every argument that `host-cal` refuses, and output that it cannot write: what it says, and that it leaves the disk as it was.
 
-mod bench;
+mod workbench;
 
 use std::fs;
 
-use bench::{Bench, RIG, snapshot};
+use workbench::{RIG, Workbench, snapshot};
 
 /// Poses of a PUMA 560 on one pairing's shell, and more rows of poses than parameters from all pairings.
-fn puma_bench() -> Bench {
-    let bench = Bench::new();
+fn puma_bench() -> Workbench {
+    let bench = Workbench::new();
     let simulate = ["simulate", "--robot", "puma560-optimised", "--plan-robot", "puma560", "--rig", "triangles", "--bar", "460"];
     for (file, more) in [("one.csv", ["--pairings", "A:1", "--per-pair", "12"]), ("all.csv", ["--seed", "3", "--per-pair", "5"])]
     {
@@ -91,7 +91,7 @@ fn output_that_cannot_be_written_is_exit_code_3_and_changes_nothing() {
 #[test]
 fn a_number_below_zero_is_refused_as_a_number() {
     const PUMA: [&str; 4] = ["--robot", "puma560", "--rig", "triangles"];
-    let bench = Bench::new();
+    let bench = Workbench::new();
     for (command, flag, number) in [
         ("simulate", "--bar", "-5"),
         ("simulate", "--sigma-mm", "-1"),
@@ -106,7 +106,7 @@ fn a_number_below_zero_is_refused_as_a_number() {
 
 #[test]
 fn more_poses_than_a_computer_can_count_are_refused() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     for count in ["50000000000000000", "18446744073709551615"] {
         let said = bench.fails(2, &["simulate", "--robot", "puma560", "--rig", "triangles", "--bar", "460", "--per-pair", count]);
         assert!(said.contains("--per-pair"), "{said}");
@@ -115,7 +115,7 @@ fn more_poses_than_a_computer_can_count_are_refused() {
 
 #[test]
 fn a_file_that_cannot_be_written_is_named_without_the_temporary_one() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     let args =
         ["simulate", "--robot", "puma560", "--rig", "triangles", "--bar", "460", "--per-pair", "1", "--out", "missing/p.csv"];
     let said = bench.fails(3, &args);
@@ -124,7 +124,7 @@ fn a_file_that_cannot_be_written_is_named_without_the_temporary_one() {
 
 #[test]
 fn what_is_no_file_is_not_replaced_by_one() {
-    let bench = Bench::new();
+    let bench = Workbench::new();
     let socket = std::os::unix::net::UnixListener::bind(bench.path("socket")).expect("a socket in the temporary folder");
     let args = ["simulate", "--robot", "puma560", "--rig", "triangles", "--bar", "460", "--per-pair", "1", "--out", "socket"];
     let run = bench.run(&args);

@@ -72,9 +72,9 @@ B,1,30.0,200.0,610.125
 const OLD: &str = "an older file that must survive\n";
 
 /// A folder with a good robot, rig and poses, and a file that nothing may touch.
-pub struct Bench(TempDir);
+pub struct Workbench(TempDir);
 
-impl Bench {
+impl Workbench {
     pub fn new() -> Self {
         let bench = Self(TempDir::new().expect("a temporary folder"));
         for (name, text) in [("robot.toml", ROBOT), ("rig.toml", RIG), ("poses.csv", POSES), ("old.toml", OLD)] {
@@ -110,7 +110,7 @@ impl Bench {
         run.stderr
     }
 
-    /// [`Bench::fails`] with bad input or usage, and a snapshot of what it says.
+    /// [`Workbench::fails`] with bad input or usage, and a snapshot of what it says.
     pub fn refuses(&self, name: &str, args: &[&str]) {
         snapshot(name, args, &self.fails(2, args));
     }
