@@ -94,13 +94,12 @@ impl<S: Real> DampedSolver<S> {
         let hundred_ulps = S::nearest(100.0) * S::EPSILON;
         let zero_column = hundred_ulps * hundred_ulps * largest;
         for (i, square) in normal.diagonal().enumerate() {
-            let vanishes = square <= zero_column;
             self.damping[i] = match damping {
+                _ if square <= zero_column => largest,
                 Damping::Identity => lambda,
-                Damping::Diagonal if vanishes => largest,
                 Damping::Diagonal => lambda * square,
             };
-            let size = if vanishes { largest + self.damping[i] } else { square + self.damping[i] };
+            let size = square + self.damping[i];
             self.scale[i] = if size > S::zero() { S::one() / size.sqrt() } else { S::one() };
         }
     }
