@@ -4,7 +4,7 @@ use ballbar::{Chain, Damping, FreeParameters, JointKind, Kinematics, Parameter};
 use ballbar_tests::experiment::{Puma, worst_parameter_difference};
 use host_cal::files::Dataset;
 use host_cal::identify::{
-    Finding, Fit, FitError, FitOptions, Hold, LmOptions, OutlierTest, ResidualSummary, Status, fit, residuals, solve,
+    Finding, Fit, FitError, FitOptions, Hold, LmOptions, OutlierTest, ResidualSummary, Status, Uncertainty, fit, residuals, solve,
 };
 use host_cal::simulate::tool_error;
 
@@ -262,4 +262,6 @@ fn free_columns_of_rounding_only_are_no_columns() {
     let solution = solve(&puma.truth.chain, &measurements, &free, &LmOptions::default());
     assert_eq!(solution.status, Status::NothingObservable);
     assert_eq!(solution.chain, puma.truth.chain);
+    let uncertainty = Uncertainty::new(&puma.truth.chain, &measurements, &free);
+    assert_eq!((uncertainty.spectrum.rank, uncertainty.std), (0, vec![None; 3]), "rounding has no deviation");
 }

@@ -26,13 +26,23 @@ pub struct Spectrum {
 impl Spectrum {
     /// Decomposes a Jacobian (n × k).
     pub fn new(jacobian: &DMatrix<f64>) -> Self {
+        let all: Vec<usize> = (0..jacobian.ncols()).collect();
+        Self::of_columns(jacobian, &all)
+    }
+
+    /// Decomposes some columns of a Jacobian. Which are zero up to rounding is judged beside all of them.
+    pub fn of_columns(jacobian: &DMatrix<f64>, indices: &[usize]) -> Self {
+        let all_scales = column_scales(jacobian);
+        Self::scaled(&jacobian.select_columns(indices), indices.iter().map(|&index| all_scales[index]).collect())
+    }
+
+    fn scaled(jacobian: &DMatrix<f64>, scales: Vec<f64>) -> Self {
         let columns = jacobian.ncols();
         if columns == 0 || jacobian.iter().any(|entry| !entry.is_finite()) {
             // Nothing to decompose, or nothing that can be: no direction counts.
             let right = DMatrix::identity(columns, columns);
             return Self { singular_values: vec![0.0; columns], rank: 0, scales: vec![1.0; columns], right };
         }
-        let scales = column_scales(jacobian);
         let mut scaled = jacobian.clone();
         for (mut column, scale) in scaled.column_iter_mut().zip(&scales) {
             column /= *scale;
@@ -50,7 +60,8 @@ impl Spectrum {
             None => DMatrix::identity(columns, columns),
         };
         let largest = singular_values.first().copied().unwrap_or(0.0);
-        let rank = singular_values.iter().filter(|&&value| value > RANK_THRESHOLD * largest).count();
+        // Among columns of unit norm the largest value is 1 or more; below it, all columns are rounding.
+        let rank = singular_values.iter().filter(|&&value| value > RANK_THRESHOLD * largest.max(1.0)).count();
         Self { singular_values, rank, scales, right }
     }
 

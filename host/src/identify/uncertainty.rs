@@ -27,7 +27,7 @@ impl Uncertainty {
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], free: &FreeParameters) -> Self {
         let observation = Observation::new(chain, measurements);
         let indices: Vec<usize> = free.indices().collect();
-        let spectrum = Spectrum::new(&observation.columns(&indices));
+        let spectrum = Spectrum::of_columns(&observation.jacobian, &indices);
         let freedom = measurements.len().saturating_sub(spectrum.rank);
         let sigma_m = (freedom > 0).then(|| (observation.residual_m.norm_squared() / freedom as f64).sqrt());
 
