@@ -94,8 +94,8 @@ impl DemoArgs {
 
         let fit = fit(&design, &fitted_poses, &FitOptions::default())?;
         let files = [
-            ("design.toml", builtin(&ROBOTS, "puma560")),
-            ("rig.toml", builtin(&RIGS, "triangles")),
+            ("design.toml", Source::named_or_read("puma560", &ROBOTS, "robot")?.text().to_owned()),
+            ("rig.toml", Source::named_or_read("triangles", &RIGS, "rig")?.text().to_owned()),
             (fitted_name, fitted_csv),
             (other_name, other_csv),
         ];
@@ -150,10 +150,6 @@ impl DemoArgs {
         let rows: Vec<_> = poses.into_iter().map(|pose| pose.row).collect();
         Ok(write_poses(truth, rig, &rows))
     }
-}
-
-fn builtin(files: &[(&str, &str)], wanted: &str) -> String {
-    files.iter().find(|(name, _)| *name == wanted).map_or_else(String::new, |(_, text)| (*text).to_owned())
 }
 
 impl DemoReport {

@@ -76,6 +76,11 @@ impl Dataset {
         pairings
     }
 
+    /// Indices of the rows of a pairing, in the order of measurement.
+    pub fn rows_of(&self, pairing: PairingId) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows.len()).filter(move |&row| self.rows[row].pairing == pairing)
+    }
+
     /// `poses.csv:12`, for row index `row`.
     pub fn place(&self, row: usize) -> String {
         format!("{}:{}", self.files[self.rows[row].file], self.rows[row].line)

@@ -240,7 +240,8 @@ fn cross_validate(
         let (left_out, kept): (Vec<_>, Vec<_>) = rows.partition(|(_, group)| **group % folds == fold);
         (kept.into_iter().map(|row| row.0).collect(), left_out.into_iter().map(|row| row.0).collect())
     };
-    let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| part(folds, fold).0.len() > free.len());
+    let kept = |folds: usize, fold: usize| group_of_row.iter().filter(|&group| group % folds != fold).count();
+    let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| kept(folds, fold) > free.len());
     let folds = [5, 10, groups].into_iter().find(enough)?;
 
     let mut squares = 0.0;

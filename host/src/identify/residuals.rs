@@ -64,10 +64,10 @@ pub fn residuals(chain: &Chain<f64>, dataset: &Dataset) -> Vec<Residual> {
 
 /// Summaries by pairing, in the rig's order.
 pub fn by_pairing(dataset: &Dataset, residuals: &[Residual]) -> Vec<PairingResiduals> {
-    let of = |pairing: PairingId| -> Vec<Residual> {
-        dataset.rows.iter().zip(residuals).filter(|(row, _)| row.pairing == pairing).map(|(_, &f)| f).collect()
+    let summarise = |pairing| {
+        let of_pairing: Vec<Residual> = dataset.rows_of(pairing).map(|row| residuals[row]).collect();
+        PairingResiduals { pairing, summary: ResidualSummary::new(&of_pairing) }
     };
-    let summarise = |pairing| PairingResiduals { pairing, summary: ResidualSummary::new(&of(pairing)) };
     dataset.pairings().into_iter().map(summarise).collect()
 }
 
@@ -127,8 +127,7 @@ pub fn neighbour_correlation(dataset: &Dataset, residuals: &[Residual]) -> Optio
     let residuals_m: Vec<f64> = residuals.iter().map(|f| f.whitened_m()).collect();
     let (mut products, mut squares, mut count) = (0.0, 0.0, 0);
     for pairing in dataset.pairings() {
-        let rows = (0..residuals_m.len()).filter(|&i| dataset.rows[i].pairing == pairing);
-        let of_pairing: Vec<f64> = rows.map(|i| residuals_m[i]).collect();
+        let of_pairing: Vec<f64> = dataset.rows_of(pairing).map(|row| residuals_m[row]).collect();
         products += of_pairing.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
         squares += of_pairing.iter().map(|f| f * f).sum::<f64>();
         count += of_pairing.len().saturating_sub(1);
@@ -141,7 +140,7 @@ pub fn neighbour_correlation(dataset: &Dataset, residuals: &[Residual]) -> Optio
 fn deviations_from_neighbours(dataset: &Dataset, residuals_m: &[f64]) -> Vec<Option<f64>> {
     let mut deviations = vec![None; residuals_m.len()];
     for pairing in dataset.pairings() {
-        let rows: Vec<usize> = (0..residuals_m.len()).filter(|&i| dataset.rows[i].pairing == pairing).collect();
+        let rows: Vec<usize> = dataset.rows_of(pairing).collect();
         for (k, &row) in rows.iter().enumerate() {
             let window = rows[k.saturating_sub(NEIGHBOURS)..rows.len().min(k + NEIGHBOURS + 1)].iter();
             let around: Vec<f64> = window.filter(|&&other| other != row).map(|&other| residuals_m[other]).collect();
