@@ -2,13 +2,16 @@
 
 use core::fmt;
 
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
 use crate::{
     MAX_JOINTS, MAX_PARAMETERS, PARAMETERS_OF_LAST_LINK, PARAMETERS_PER_JOINT, Parameter, ParameterKind, ParameterUnit, Real,
     Row, Vector3,
 };
 
 /// What a joint does along or about its z axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
 pub enum JointKind {
     /// `J = Rz(θ)`, θ in radians.
     Revolute,

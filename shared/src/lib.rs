@@ -1,9 +1,12 @@
-//! What the ball-bar's board and host must agree on to the bit: the kinematic chain, the length of the bar and its gradient,
-//! and the incremental normal equations with their damped step.
+//! What the ball-bar's board and host must agree on to the bit: the kinematic chain, the length of the bar and its gradient, the
+//! incremental normal equations with their damped step, the way from encoder counts and LVDT codes to joint values and
+//! displacements, and the messages by which the two talk ([`wire`]).
 //!
 //! A number's way through this crate:
 //!
 //! ```text
+//! counters ──ExtendedCounter──▶ Sample ──SettleDetector──▶ SettledPose ──JointEncoders::q, LvdtCurve──▶ q, length
+//!
 //! Chain ──Kinematics::new──▶ Kinematics ──residual_row(Measurement)──▶ residual f, row ∂d/∂p
 //!                                                                           │ NormalEquations::add
 //! new parameters ◀──Chain::apply── Step ◀──DampedSolver::solve(λ)── JᵀWJ, JᵀWf
@@ -16,18 +19,26 @@
 #![forbid(unsafe_code)]
 
 mod chain;
+mod crc32;
 mod kinematics;
 mod normal;
 mod parameter;
 mod real;
+mod sensing;
 mod step;
 mod trig;
+pub mod wire;
 
+pub use crc32::{crc32, crc32_digest};
 pub use chain::{Chain, ChainError, Joint, JointKind, JointVector, Link};
 pub use kinematics::{Kinematics, Measurement, Pairing, Pose};
 pub use normal::{FreeParameters, FreeParametersError, FreeSetMismatch, NormalEquations};
 pub use parameter::{Parameter, ParameterKind, ParameterUnit, UnknownParameter};
 pub use real::Real;
+pub use sensing::{
+    CounterWidth, Counts, Coupling, Encoder, EncoderError, ExtendedCounter, IndexCheck, JointEncoders, LVDT_COEFFICIENTS, LvdtCurve,
+    LvdtFault, LvdtReading, MAX_COUPLINGS, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria,
+};
 pub use step::{DampedSolver, Damping, NotPositiveDefinite, Step};
 pub use trig::sin_cos_f32;
 

@@ -1,0 +1,144 @@
+//! The parameters in use, those that wait to be, and their way into flash.
+
+use ballbar::LvdtCurve;
+use ballbar::wire::{CompiledParameters, ParameterSet, Refusal, SetIdentity, SlotState, WhichSet};
+
+use crate::log::{info, warning};
+use crate::slots::{Slots, set_crc};
+use crate::{ENCODERS, ParameterFlash};
+
+/// Parameters of a board. Nothing changes those in use but a commit that succeeded.
+pub(crate) struct Parameters {
+    slots: Slots,
+    active: Option<Active>,
+    staged: Option<Staged>,
+}
+
+struct Active {
+    identity: SetIdentity,
+    compiled: CompiledParameters,
+}
+
+struct Staged {
+    set: ParameterSet,
+    compiled: CompiledParameters,
+    crc: u32,
+}
+
+impl Parameters {
+    /// Takes into use what the flash holds.
+    pub(crate) fn load(flash: &mut impl ParameterFlash) -> Self {
+        let (slots, set) = Slots::load(flash);
+        // A whole set that this firmware cannot use was written by another one; it stays in flash, unused.
+        let active = set.and_then(|set| Staged::check(set).ok()).map(|staged| Active::new(staged, &slots));
+        if active.is_none() {
+            warning!("no parameters in flash");
+        }
+        Self { slots, active, staged: None }
+    }
+
+    pub(crate) fn active(&self) -> Option<&CompiledParameters> {
+        self.active.as_ref().map(|active| &active.compiled)
+    }
+
+    pub(crate) fn identity(&self) -> Option<&SetIdentity> {
+        self.active.as_ref().map(|active| &active.identity)
+    }
+
+    pub(crate) fn staged_crc(&self) -> Option<u32> {
+        self.staged.as_ref().map(|staged| staged.crc)
+    }
+
+    pub(crate) fn slots(&self) -> [SlotState; 2] {
+        self.slots.states()
+    }
+
+    pub(crate) fn compiled(&self, which: WhichSet) -> Result<&CompiledParameters, Refusal> {
+        let compiled = match which {
+            WhichSet::Active => self.active(),
+            WhichSet::Staged => self.staged.as_ref().map(|staged| &staged.compiled),
+        };
+        compiled.ok_or(Refusal::NoParameters)
+    }
+
+    /// The set itself; that in use is read from flash, so that the answer is what is stored.
+    pub(crate) fn read(&self, which: WhichSet, flash: &mut impl ParameterFlash) -> Result<ParameterSet, Refusal> {
+        match which {
+            WhichSet::Active => self.active.as_ref().and_then(|_| Slots::load(flash).1),
+            WhichSet::Staged => self.staged.as_ref().map(|staged| staged.set.clone()),
+        }
+        .ok_or(Refusal::NoParameters)
+    }
+
+    /// CRC-32 of what the flash holds now.
+    pub(crate) fn stored_crc(flash: &mut impl ParameterFlash) -> Option<u32> {
+        Slots::load(flash).0.active().map(|(_, crc)| crc)
+    }
+
+    pub(crate) fn stage(&mut self, set: ParameterSet) -> Result<u32, Refusal> {
+        let staged = Staged::check(set)?;
+        let crc = staged.crc;
+        self.staged = Some(staged);
+        Ok(crc)
+    }
+
+    /// Another LVDT curve for the staged set; when none is staged, the one in use is staged with it.
+    pub(crate) fn stage_lvdt(&mut self, lvdt: LvdtCurve, flash: &mut impl ParameterFlash) -> Result<u32, Refusal> {
+        if !lvdt.is_valid() {
+            return Err(Refusal::LvdtCurve);
+        }
+        let base = if self.staged.is_some() { WhichSet::Staged } else { WhichSet::Active };
+        let set = self.read(base, flash)?;
+        self.stage(ParameterSet { lvdt, ..set })
+    }
+
+    pub(crate) fn discard(&mut self) {
+        self.staged = None;
+    }
+
+    /// Whether a commit of this CRC has nothing left to do.
+    pub(crate) fn is_committed(&self, crc: u32) -> bool {
+        self.staged.is_none() && self.identity().is_some_and(|identity| identity.crc == crc)
+    }
+
+    /// Stores the staged set and takes it into use.
+    pub(crate) fn commit(&mut self, crc: u32, flash: &mut impl ParameterFlash) -> Result<(), Refusal> {
+        match &self.staged {
+            None => return Err(Refusal::NoParameters),
+            Some(staged) if staged.crc != crc => return Err(Refusal::OtherCrc { staged: staged.crc }),
+            Some(staged) => {
+                if self.slots.commit(flash, &staged.set).is_err() {
+                    warning!("the flash did not take the parameters");
+                    return Err(Refusal::Flash);
+                }
+            }
+        }
+        info!("parameters committed");
+        self.active = self.staged.take().map(|staged| Active::new(staged, &self.slots));
+        Ok(())
+    }
+}
+
+impl Active {
+    fn new(staged: Staged, slots: &Slots) -> Self {
+        let identity = SetIdentity {
+            name: staged.set.name,
+            is_calibrated: staged.set.is_calibrated,
+            joints: staged.compiled.joints as u8,
+            sequence: slots.active().map_or(0, |(sequence, _)| sequence),
+            crc: staged.crc,
+        };
+        Self { identity, compiled: staged.compiled }
+    }
+}
+
+impl Staged {
+    fn check(set: ParameterSet) -> Result<Self, Refusal> {
+        let compiled = set.compile().map_err(Refusal::Parameters)?;
+        if compiled.joints > ENCODERS {
+            return Err(Refusal::TooManyJoints { joints: compiled.joints as u8, encoders: ENCODERS as u8 });
+        }
+        let crc = set_crc(&set).ok_or(Refusal::Flash)?;
+        Ok(Self { set, compiled, crc })
+    }
+}

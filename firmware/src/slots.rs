@@ -1,0 +1,193 @@
+//! Parameters in flash, in two slots of which one is always whole.
+//!
+//! A slot is a header and a set as postcard, little-endian:
+//!
+//! | bytes | |
+//! | --- | --- |
+//! | 0..4 | magic `BBPS` |
+//! | 4..8 | layout: hash of the set's type, so that a set of another layout is never misread |
+//! | 8..12 | sequence, one more at every commit |
+//! | 12..16 | length of the set, bytes |
+//! | 16..20 | CRC-32 over bytes 0 to 16 and the set |
+//! | 20.. | the set, padded with ones to the flash's word |
+//!
+//! A commit erases and writes the older slot, the set first and its header last, and reads it back; the newer slot is not touched
+//! until then. Whatever byte the power fails at, the newer slot is whole, or the one just written is. The first commit ever writes
+//! both, so that from then on one slot may also be lost to a flipped bit.
+
+use ballbar::wire::{ParameterSet, SlotState};
+use ballbar::{crc32, crc32_digest};
+use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+use postcard_schema::key::Key;
+
+use crate::ParameterFlash;
+
+const MAGIC: [u8; 4] = *b"BBPS";
+const LAYOUT: [u8; 4] = {
+    let key = Key::for_path::<ParameterSet>("slot").to_bytes();
+    [key[0], key[1], key[2], key[3]]
+};
+const HEADER_BYTES: usize = 20;
+/// The longest set, with room to grow.
+const MAX_SET_BYTES: usize = 1004;
+/// The most bytes that a slot uses.
+pub const SLOT_IMAGE_BYTES: usize = HEADER_BYTES + MAX_SET_BYTES;
+
+type Image = [u8; SLOT_IMAGE_BYTES];
+
+/// What stands in the two slots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slots {
+    states: [SlotState; 2],
+}
+
+/// Why parameters were not stored. The old ones are still there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommitError {
+    /// The set does not fit into a slot.
+    TooLong,
+    /// The flash could not be erased or written.
+    Flash,
+    /// What was written reads back as something else.
+    ReadBack,
+}
+
+impl Slots {
+    /// Reads both slots; returns the newest whole set as well.
+    pub fn load(flash: &mut impl ParameterFlash) -> (Self, Option<ParameterSet>) {
+        let first = read_slot(flash, 0);
+        let second = read_slot(flash, 1);
+        let slots = Self { states: [first.0, second.0] };
+        let set = match slots.newest() {
+            Some(0) => first.1,
+            Some(_) => second.1,
+            None => None,
+        };
+        (slots, set)
+    }
+
+    /// The two places.
+    pub fn states(&self) -> [SlotState; 2] {
+        self.states
+    }
+
+    /// Sequence and CRC-32 of the set in use.
+    pub fn active(&self) -> Option<(u32, u32)> {
+        match self.states[self.newest()?] {
+            SlotState::Good { sequence, crc } => Some((sequence, crc)),
+            _ => None,
+        }
+    }
+
+    /// Stores a set; it is then the newest.
+    ///
+    /// # Errors
+    /// [`CommitError`]; the newest set before is the newest still.
+    pub fn commit(&mut self, flash: &mut impl ParameterFlash, set: &ParameterSet) -> Result<(), CommitError> {
+        let sequence = self.active().map_or(0, |(sequence, _)| sequence.wrapping_add(1));
+        let oldest = self.newest().map_or(0, |newest| 1 - newest);
+        self.write(flash, oldest, sequence, set)?;
+        if !matches!(self.states[1 - oldest], SlotState::Good { .. }) {
+            self.write(flash, 1 - oldest, sequence, set)?;
+        }
+        Ok(())
+    }
+
+    fn newest(&self) -> Option<usize> {
+        match self.states {
+            [SlotState::Good { sequence: a, .. }, SlotState::Good { sequence: b, .. }] => {
+                Some(usize::from(b.wrapping_sub(a) as i32 > 0))
+            }
+            [SlotState::Good { .. }, _] => Some(0),
+            [_, SlotState::Good { .. }] => Some(1),
+            _ => None,
+        }
+    }
+
+    fn write(
+        &mut self,
+        flash: &mut impl ParameterFlash,
+        slot: usize,
+        sequence: u32,
+        set: &ParameterSet,
+    ) -> Result<(), CommitError> {
+        let mut image: Image = [0xff; SLOT_IMAGE_BYTES];
+        let length = image_of(sequence, set, &mut image)?;
+        self.states[slot] = SlotState::Damaged;
+        write_image(flash, slot, &image, length).map_err(|()| CommitError::Flash)?;
+        let (state, stored) = read_slot(flash, slot);
+        self.states[slot] = state;
+        if stored.as_ref().is_some_and(|stored| is_same(stored, set)) { Ok(()) } else { Err(CommitError::ReadBack) }
+    }
+}
+
+/// CRC-32 of a set as it is stored; what a host commits with.
+pub(crate) fn set_crc(set: &ParameterSet) -> Option<u32> {
+    let mut image: Image = [0xff; SLOT_IMAGE_BYTES];
+    let length = image_of(0, set, &mut image).ok()?;
+    Some(crc32(&image[HEADER_BYTES..length]))
+}
+
+/// To the bit, which `==` on floats is not.
+fn is_same(a: &ParameterSet, b: &ParameterSet) -> bool {
+    a == b && set_crc(a) == set_crc(b)
+}
+
+/// Header and set; returns their length together.
+fn image_of(sequence: u32, set: &ParameterSet, image: &mut Image) -> Result<usize, CommitError> {
+    let length = postcard::to_slice(set, &mut image[HEADER_BYTES..]).map_err(|_| CommitError::TooLong)?.len();
+    image[0..4].copy_from_slice(&MAGIC);
+    image[4..8].copy_from_slice(&LAYOUT);
+    image[8..12].copy_from_slice(&sequence.to_le_bytes());
+    image[12..16].copy_from_slice(&(length as u32).to_le_bytes());
+    let crc = image_crc(&image[..HEADER_BYTES + length]);
+    image[16..20].copy_from_slice(&crc.to_le_bytes());
+    Ok(HEADER_BYTES + length)
+}
+
+/// Over everything but the CRC itself.
+fn image_crc(image: &[u8]) -> u32 {
+    let mut digest = crc32_digest();
+    digest.update(&image[..16]);
+    digest.update(&image[HEADER_BYTES..]);
+    digest.finalize()
+}
+
+/// Erases the slot, writes the set, then the header that makes it valid. The word in which the two meet goes with the header.
+fn write_image<F: ParameterFlash>(flash: &mut F, slot: usize, image: &Image, length: usize) -> Result<(), ()> {
+    let word = <F as NorFlash>::WRITE_SIZE;
+    let start = slot as u32 * F::SLOT_BYTES;
+    let header = HEADER_BYTES.next_multiple_of(word);
+    let end = length.next_multiple_of(word);
+    if end > SLOT_IMAGE_BYTES || end > F::SLOT_BYTES as usize {
+        return Err(());
+    }
+    flash.erase(start, start + F::SLOT_BYTES).map_err(|_| ())?;
+    flash.write(start + header as u32, &image[header..end]).map_err(|_| ())?;
+    flash.write(start, &image[..header]).map_err(|_| ())
+}
+
+fn read_slot<F: ParameterFlash>(flash: &mut F, slot: usize) -> (SlotState, Option<ParameterSet>) {
+    let mut image: Image = [0; SLOT_IMAGE_BYTES];
+    let length = SLOT_IMAGE_BYTES.min(F::SLOT_BYTES as usize) / <F as ReadNorFlash>::READ_SIZE * <F as ReadNorFlash>::READ_SIZE;
+    if flash.read(slot as u32 * F::SLOT_BYTES, &mut image[..length]).is_err() {
+        return (SlotState::Damaged, None);
+    }
+    if image[..HEADER_BYTES].iter().all(|&byte| byte == 0xff) {
+        return (SlotState::Empty, None);
+    }
+    match parse(&image[..length]) {
+        Some((sequence, crc, set)) => (SlotState::Good { sequence, crc }, Some(set)),
+        None => (SlotState::Damaged, None),
+    }
+}
+
+fn parse(image: &[u8]) -> Option<(u32, u32, ParameterSet)> {
+    let word = |at: usize| Some(u32::from_le_bytes(image.get(at..at + 4)?.try_into().ok()?));
+    let length = usize::try_from(word(12)?).ok()?;
+    let image = image.get(..HEADER_BYTES.checked_add(length)?)?;
+    let is_valid = image[0..4] == MAGIC && image[4..8] == LAYOUT && image_crc(image) == word(16)?;
+    let payload = &image[HEADER_BYTES..];
+    let set = is_valid.then(|| ballbar::wire::decode(payload))??;
+    Some((word(8)?, crc32(payload), set))
+}

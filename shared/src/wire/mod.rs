@@ -1,0 +1,23 @@
+//! What travels between board and host: messages, and the frames that carry them.
+//!
+//! ```text
+//! message ──postcard──▶ payload ──+ CRC-32──COBS──▶ frame, ended by 0x00
+//! ```
+//!
+//! The first variant of both enums is the hello. Its beginning, the protocol's number and the schema's hash, never changes, so that
+//! two ends of different versions can still tell each other what they are. All else may change with the number.
+
+mod batch;
+mod frame;
+mod messages;
+mod parameter_set;
+mod status;
+
+pub use batch::{MAX_BATCH, MAX_POSE_BATCH, PoseBatch, SampleBatch, SampleStep, StreamedPose};
+pub use frame::{FrameCounts, FrameError, FrameFault, FrameReader, MAX_FRAME, MAX_PAYLOAD, decode, encode};
+pub use messages::{
+    Answer, BoardHello, Command, CurrentPose, Event, HostHello, LogMark, PROTOCOL, ProtocolVersion, Refusal, Reply, Request, ResetReason,
+    Stream, StreamSelection, ToBoard, ToHost, ToolPose, WhichSet, hello_version,
+};
+pub use parameter_set::{CompiledParameters, ParameterSet, ParameterSetError, SetIdentity};
+pub use status::{Check, CheckResult, EncoderStatus, LinkCounts, SelfTest, SlotState, Status};
