@@ -124,7 +124,9 @@ impl<'q, H: Hardware> Board<'q, H> {
         self.answer(&ToHost::Reply(reply));
     }
 
-    /// A reply for which there is no room is lost; the host asks again under the same number.
+    /// A reply for which there is no room is lost; the host asks again under the same number. Not inlined, so that the frame does
+    /// not lie on the stack while the reply is made.
+    #[inline(never)]
     fn answer(&mut self, message: &ToHost) {
         let mut buffer = [0; MAX_FRAME];
         if let Ok(frame) = encode(message, &mut buffer) {

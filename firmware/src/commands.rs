@@ -70,9 +70,7 @@ impl<H: Hardware> Board<'_, H> {
         match command {
             Command::Status => Ok(Answer::Status(self.status())),
             Command::SelfTest => Ok(Answer::SelfTest(self_test(&self.findings()))),
-            Command::ReadParameters(which) => {
-                self.parameters.read(*which, self.hardware.flash()).map(Answer::Parameters)
-            }
+            Command::ReadParameters(which) => self.parameters.read(*which, self.hardware.flash()).map(Answer::Parameters),
             Command::WriteParameters(set) => self.parameters.stage(set.clone()).map(|crc| Answer::Staged { crc }),
             Command::SetLvdt(curve) => {
                 self.parameters.stage_lvdt(*curve, self.hardware.flash()).map(|crc| Answer::Staged { crc })

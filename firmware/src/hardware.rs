@@ -50,7 +50,8 @@ pub trait TriggeredAdc {
 
 /// Time since start, which never steps back and never wraps.
 pub trait MonotonicClock {
-    /// Microseconds since start. Called at least 100 times a second, so that a narrow counter may be extended in it.
+    /// Microseconds since start. Called at least 100 times a second, so that a narrow counter may be extended in it; where flash
+    /// stalls the processor, the counter must also bridge the longest stall.
     fn now_us(&mut self) -> u64;
 }
 
@@ -79,7 +80,8 @@ pub struct BoardFacts {
     pub unique_id: [u8; 12],
     /// Time from the first to the last counter of a latch, at most, nanoseconds.
     pub encoder_skew_ns: u32,
-    /// Time from the latch of the encoders to the middle of the LVDT's scan, nanoseconds.
+    /// Time from the latch of the encoders to the middle of the LVDT's scan, nanoseconds. The delay of analogue filters before the
+    /// converter is not in it.
     pub lvdt_delay_ns: u32,
 }
 

@@ -1,8 +1,8 @@
 //! The stream: batches of samples and poses, numbered, and dropped whole when the link is slow.
 
 use ballbar::wire::{
-    CompiledParameters, Event, MAX_BATCH, MAX_FRAME, MAX_POSE_BATCH, PoseBatch, SampleBatch, Stream, StreamSelection, StreamedPose, ToHost,
-    ToolPose, encode,
+    CompiledParameters, Event, MAX_BATCH, MAX_FRAME, MAX_POSE_BATCH, PoseBatch, SampleBatch, Stream, StreamSelection,
+    StreamedPose, ToHost, ToolPose, encode,
 };
 use ballbar::{Sample, SettledPose};
 
@@ -124,14 +124,15 @@ impl Streamer {
         });
         let age_us = sample.t_us.saturating_sub(batch.t_us);
         let _ = batch.poses.push(StreamedPose { dt_us: age_us as u32, pose, displacement_m });
-        if batch.poses.len() == MAX_POSE_BATCH || age_us >= BATCH_AGE_US {
-            if let Some(batch) = self.poses.take() {
-                self.emit(Event::Poses(batch), sensors, outbox);
-            }
+        let is_due = batch.poses.len() == MAX_POSE_BATCH || age_us >= BATCH_AGE_US;
+        if let Some(batch) = self.poses.take_if(|_| is_due) {
+            self.emit(Event::Poses(batch), sensors, outbox);
         }
     }
 
-    /// Numbers a message and queues it; when the link has no room, the message is dropped and counted.
+    /// Numbers a message and queues it; when the link has no room, the message is dropped and counted. Not inlined, so that its
+    /// kilobytes of message and frame do not lie on the stack of every caller.
+    #[inline(never)]
     fn emit(&mut self, event: Event, sensors: &Sensors, outbox: &mut Outbox) {
         let message = ToHost::Stream(Stream {
             sequence: self.sequence,

@@ -29,15 +29,15 @@ mod step;
 mod trig;
 pub mod wire;
 
-pub use crc32::{crc32, crc32_digest};
 pub use chain::{Chain, ChainError, Joint, JointKind, JointVector, Link};
+pub use crc32::{crc32, crc32_digest};
 pub use kinematics::{Kinematics, Measurement, Pairing, Pose};
 pub use normal::{FreeParameters, FreeParametersError, FreeSetMismatch, NormalEquations};
 pub use parameter::{Parameter, ParameterKind, ParameterUnit, UnknownParameter};
 pub use real::Real;
 pub use sensing::{
-    CounterWidth, Counts, Coupling, Encoder, EncoderError, ExtendedCounter, IndexCheck, JointEncoders, LVDT_COEFFICIENTS, LvdtCurve,
-    LvdtFault, LvdtReading, MAX_COUPLINGS, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria,
+    CounterWidth, Counts, Coupling, Encoder, EncoderError, ExtendedCounter, IndexCheck, JointEncoders, LVDT_COEFFICIENTS,
+    LvdtCurve, LvdtFault, LvdtReading, MAX_COUPLINGS, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria,
 };
 pub use step::{DampedSolver, Damping, NotPositiveDefinite, Step};
 pub use trig::sin_cos_f32;

@@ -82,10 +82,7 @@ impl SampleStep {
             index: before.index.wrapping_add(1),
             t_us: before.t_us.wrapping_add(u64::from(self.dt_us)),
             counts: before.counts.iter().zip(&self.counts).map(|(before, step)| before.wrapping_add(*step)).collect(),
-            lvdt: LvdtReading {
-                code: i32::from(before.lvdt.code).wrapping_add(self.code) as u16,
-                saturated: self.saturated,
-            },
+            lvdt: LvdtReading { code: i32::from(before.lvdt.code).wrapping_add(self.code) as u16, saturated: self.saturated },
         }
     }
 }

@@ -14,7 +14,8 @@ use crate::{LvdtCurve, MAX_JOINTS, Pose, SettledPose, StillnessCriteria};
 pub const PROTOCOL: ProtocolVersion = ProtocolVersion {
     number: 1,
     schema: {
-        let (to_board, to_host) = (Key::for_path::<ToBoard>("to-board").to_bytes(), Key::for_path::<ToHost>("to-host").to_bytes());
+        let (to_board, to_host) =
+            (Key::for_path::<ToBoard>("to-board").to_bytes(), Key::for_path::<ToHost>("to-host").to_bytes());
         let mut both = [0; 8];
         let mut i = 0;
         while i < both.len() {

@@ -16,8 +16,8 @@ mod status;
 pub use batch::{MAX_BATCH, MAX_POSE_BATCH, PoseBatch, SampleBatch, SampleStep, StreamedPose};
 pub use frame::{FrameCounts, FrameError, FrameFault, FrameReader, MAX_FRAME, MAX_PAYLOAD, decode, encode};
 pub use messages::{
-    Answer, BoardHello, Command, CurrentPose, Event, HostHello, LogMark, PROTOCOL, ProtocolVersion, Refusal, Reply, Request, ResetReason,
-    Stream, StreamSelection, ToBoard, ToHost, ToolPose, WhichSet, hello_version,
+    Answer, BoardHello, Command, CurrentPose, Event, HostHello, LogMark, PROTOCOL, ProtocolVersion, Refusal, Reply, Request,
+    ResetReason, Stream, StreamSelection, ToBoard, ToHost, ToolPose, WhichSet, hello_version,
 };
 pub use parameter_set::{CompiledParameters, ParameterSet, ParameterSetError, SetIdentity};
 pub use status::{Check, CheckResult, EncoderStatus, LinkCounts, SelfTest, SlotState, Status};

@@ -6,7 +6,10 @@ use heapless::{String, Vec};
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, Kinematics, LvdtCurve, MAX_COUPLINGS, MAX_JOINTS, MAX_PARAMETERS};
+use crate::{
+    Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, Kinematics, LvdtCurve, MAX_COUPLINGS, MAX_JOINTS,
+    MAX_PARAMETERS,
+};
 
 /// Parameters as they travel and as they stand in flash.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -75,7 +78,9 @@ impl fmt::Display for ParameterSetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Sizes => f.write_str("numbers of joints, parameters and encoders do not fit together"),
-            Self::NotFinite { index } => write!(f, "{} is not a finite number", crate::Parameter::from_index(usize::from(*index))),
+            Self::NotFinite { index } => {
+                write!(f, "{} is not a finite number", crate::Parameter::from_index(usize::from(*index)))
+            }
             Self::Encoders(error) => error.fmt(f),
             Self::Lvdt => f.write_str("the LVDT curve has no range of codes or no finite coefficients"),
         }

@@ -14,16 +14,22 @@ static mut RECORD: MaybeUninit<CrashRecord> = MaybeUninit::uninit();
 
 /// The line that the run before this one left, once. To be called before interrupts are let in.
 pub(crate) fn take() -> Option<String<96>> {
-    // SAFETY: called before there is a second thread of execution, and any bits are a `CrashRecord`: its checksum tells whether
-    // they are a true one.
-    unsafe { (*&raw mut RECORD).assume_init_mut() }.take()
+    // SAFETY: there is no second thread of execution yet.
+    unsafe { record() }.take()
 }
 
 fn store_and_reset(line: core::fmt::Arguments) -> ! {
     cortex_m::interrupt::disable();
-    // SAFETY: with the interrupts off, and no way back, this is the only thread of execution; any bits are a `CrashRecord`.
-    unsafe { (*&raw mut RECORD).assume_init_mut() }.store(line);
+    // SAFETY: with the interrupts off, and no way back, this is the only thread of execution.
+    unsafe { record() }.store(line);
     SCB::sys_reset()
+}
+
+/// # Safety
+/// There must be no other reference to the record.
+unsafe fn record() -> &'static mut CrashRecord {
+    // SAFETY: the caller's word; and any bits are a `CrashRecord`, whose checksum tells whether they are a true one.
+    unsafe { &mut *(&raw mut RECORD).cast() }
 }
 
 #[panic_handler]

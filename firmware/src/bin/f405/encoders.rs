@@ -1,14 +1,14 @@
 //! Six quadrature encoders on the six timers that can count them, and their index pulses.
 //!
-//! Written on the registers: the library's encoder driver knows neither 32-bit counters nor input filters.
+//! Written on the registers: stm32f4xx-hal's encoder driver knows neither 32-bit counters nor input filters.
 //!
 //! Counting: both edges of both channels (slave mode 3), so four counts a line.
 //!
 //! Input filter: a level counts once it stood for 8 samples at `f_DTS / 32`, which is 84 MHz / 32 = 2.625 MHz on all six timers
 //! (TIM1 and TIM8 run at 168 MHz and divide by two). Pulses shorter than 7 / 2.625 MHz = 2.67 µs never count, levels of more than
-//! 9 / 2.625 MHz = 3.43 µs always do, and counts come 3.05 to 3.43 µs late. A channel holds its level for two counts, hence at most
-//! 583,000 counts a second from a perfect encoder; half of that, 290,000, leaves room for duty cycles and phases that are off.
-//! The fastest joint of a PUMA 560 makes some 75,000.
+//! 9 / 2.625 MHz = 3.43 µs always do, and counts come 3.05 to 3.43 µs late. A channel holds its level for two counts, hence at
+//! most 583,000 counts a second from a perfect encoder; half of that, 290,000, leaves room for duty cycles and phases that are
+//! off. The fastest joint of a PUMA 560 makes some 75,000 (at 6 rad/s).
 //!
 //! Skew: the counters are read one after the other with interrupts held off, in about 80 cycles of 168 MHz (four reads over APB1
 //! at 42 MHz, two over APB2 at 84 MHz); [`SKEW_NS`] allows 100. An estimate from the instructions, not measured.

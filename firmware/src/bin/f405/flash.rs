@@ -1,11 +1,12 @@
 //! The two parameter slots: sectors 1 and 2 of the flash, 16 KiB each, behind the vector table's sector 0.
 //!
-//! Written on the registers: the library's driver erases with 8-bit parallelism, for 0.4 to 0.8 s, and counts in sectors of 128 KiB.
-//! With 32 bits (supply of 2.7 V or more) an erase takes 250 ms, at most 500 ms, and a word 16 µs, at most 100 µs (datasheet).
+//! Written on the registers: stm32f4xx-hal's driver erases with 8-bit parallelism, for 0.4 to 0.8 s, and counts in sectors of 128
+//! KiB. With 32 bits (supply of 2.7 V or more) an erase takes 250 ms, at most 500 ms, and a word 16 µs, at most 100 µs
+//! (datasheet).
 //!
 //! The program is fetched from the same bank, so the processor stands still for that time: no sampling interrupt runs, and the
-//! clock's and the counters' extension have to bridge the gap (`clock.rs`; a 16-bit counter may move by 32,767 counts in it, which
-//! no joint of a PUMA 560 does in 0.5 s). DMA, timers and watchdog go on.
+//! clock's and the counters' extension have to bridge the gap (`clock.rs`; a 16-bit counter may move by 32,767 counts in it,
+//! which no joint of a PUMA 560 does in 0.5 s). DMA, timers and watchdog go on.
 
 #![allow(unsafe_code)] // memory-mapped flash
 

@@ -1,14 +1,14 @@
 //! The serial link to the host: USART2 on PA2 and PA3, 921,600 baud, 8N1, with DMA both ways.
 //!
-//! Baud rate: 42 MHz / 46 = 913,043, which is 0.93 % below 921,600 and the nearest that the bus clock divides to. A receiver takes
-//! 3.3 % or more in all; an adapter that is exact itself samples the last bit 9 % of a bit late.
+//! Baud rate: 42 MHz / 46 = 913,043, which is 0.93 % below 921,600 and the nearest that the bus clock divides to. A receiver
+//! takes 3.3 % or more in all; an adapter that is exact itself samples the last bit 9 % of a bit late.
 //!
 //! Receiving: DMA1 stream 5 fills a ring for ever. The ring holds 22 ms of an unbroken stream; bytes that nobody read by then are
 //! written over, and the frames' checksums notice. That covers the longest sleep of the main loop, 10 ms, but not an erase of the
 //! flash (0.5 s): the host waits for the answer that follows it.
 //!
-//! Transmitting: the main loop puts bytes into a ring and raises the interrupt of DMA1 stream 6; the interrupt alone moves the ring
-//! to the wire, piece after piece. Each index has one writer, so neither side ever waits for the other.
+//! Transmitting: the main loop puts bytes into a ring and raises the interrupt of DMA1 stream 6; the interrupt alone moves the
+//! ring to the wire, piece after piece. Each index has one writer, so neither side ever waits for the other.
 
 #![allow(unsafe_code)] // DMA streams read and write memory
 
@@ -17,7 +17,7 @@ use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering, fence};
 
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 use stm32f4xx_hal::dma::config::Priority;
-use stm32f4xx_hal::dma::traits::{Stream, StreamISR};
+use stm32f4xx_hal::dma::traits::Stream;
 use stm32f4xx_hal::dma::{DmaChannel, DmaDataSize, DmaDirection, StreamX, StreamsTuple};
 use stm32f4xx_hal::pac::{DMA1, Interrupt, USART2};
 use stm32f4xx_hal::prelude::*;
@@ -25,8 +25,8 @@ use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 const BUS_CLOCK_HZ: u32 = 42_000_000;
 const BAUD: u32 = 921_600;
-/// Sixteenths of the clock's periods a bit.
-const DIVIDER: u32 = (BUS_CLOCK_HZ + BAUD / 2) / BAUD;
+/// Periods of the bus clock a bit.
+const DIVIDER: u16 = ((BUS_CLOCK_HZ + BAUD / 2) / BAUD) as u16;
 
 const RECEIVE_BYTES: usize = 2_048;
 const TRANSMIT_BYTES: usize = 4_096;
@@ -66,7 +66,7 @@ impl SerialLink {
 
         USART2::enable(rcc);
         USART2::reset(rcc);
-        // SAFETY: the lower 16 bits are the divider in sixteenths; 46 fits.
+        // SAFETY: mantissa and fraction together are the divider in sixteenths, with sixteen samples a bit.
         usart.brr().write(|w| unsafe { w.bits(DIVIDER) });
         usart.cr3().write(|w| {
             w.dmar().enabled();
@@ -192,10 +192,12 @@ impl Transmitter {
         if self.in_flight == 0 {
             return;
         }
+        // SAFETY: a write of ones and this zero clears "complete" alone, which the DMA's writes do not, and `flush` waits for.
+        unsafe { &*USART2::ptr() }.sr().write(|w| w.tc().clear());
         self.stream.set_memory_address(TO_SEND[start..].as_ptr() as u32);
         self.stream.set_number_of_transfers(self.in_flight as u16);
         fence(Ordering::Release); // what was written reaches memory before the stream reads it
-        // SAFETY: it reads `in_flight` bytes from `start` on, within `TO_SEND`, and the main loop keeps off them until they are sent.
+        // SAFETY: it reads `in_flight` bytes from `start` on, within `TO_SEND`, and the main loop keeps off them until they went.
         unsafe { self.stream.enable() };
     }
 }

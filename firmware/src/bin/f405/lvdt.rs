@@ -3,21 +3,21 @@
 //! A scan alternates between PC0 (channel 10), the conditioner's output, and PC1 (channel 11), its reference at half scale. What
 //! both carry, an offset of the converter or of its ground, drops out of the difference of the sums.
 //!
-//! Scale: `code = 32768 + 2 · (ΣPC0 − ΣPC1)` over eight conversions of each. With the reference at half of VDDA the code runs from
-//! 0 to 65,520; one step is 1/16 of a 12-bit step, 50 µV of 3.3 V. A reference off half scale moves the range, and a code beyond
-//! 16 bits is held at the end and marked as saturated.
+//! Scale: `code = 32768 + 2 · (ΣPC0 − ΣPC1)` over eight conversions of each. With the reference at half of VDDA the code runs
+//! from 0 to 65,520; one step is 1/16 of a 12-bit step, 50 µV of 3.3 V. A reference off half scale moves the range, and a code
+//! beyond 16 bits is held at the end and marked as saturated.
 //!
-//! Noise: the datasheet gives no figure for the noise of one conversion. With 1 step of 12 bits RMS each, the sums of 8 and 8 have
-//! √16 steps and the code 8 (0.4 mV, or 1.2e-4 of full scale); the averages of the settling detection take it down further.
+//! Noise: the datasheet gives no figure for the noise of one conversion. With 1 step of 12 bits RMS each, the sums of 8 and 8
+//! have √16 steps and the code 8 (0.4 mV, or 1.2e-4 of full scale); the averages of the settling detection take it down further.
 //! Quantisation alone, with that much noise to dither it, adds 8 · 0.29 = 2.3. Estimates, not measured.
 //!
 //! Timing: PCLK2 84 MHz / 4 = 21 MHz (at most 36 MHz for VDDA from 2.4 V). 15 cycles of sampling (0.71 µs) and 12 of conversion
-//! are 27 cycles or 1.29 µs each, 20.6 µs a scan, against 200 µs between samples at the highest rate. The sampling capacitor
-//! (4 pF, behind at most 6 kΩ) settles within 24 ns · ln(2¹⁴) = 0.23 µs from a source of no impedance, which the capacitor at the
+//! are 27 cycles or 1.29 µs each, 20.6 µs a scan, against 200 µs between samples at the highest rate. The sampling capacitor (4
+//! pF, behind at most 6 kΩ) settles within 24 ns · ln(2¹⁴) = 0.23 µs from a source of no impedance, which the capacitor at the
 //! pin is to it (`docs/board.md`).
 //!
-//! Start: by software, from the sampling interrupt. TIM1 to TIM5 and TIM8 are the only timers that can trigger ADC1, and all of them
-//! count encoders. The interrupt's jitter therefore moves scan and latch together, and their distance stays.
+//! Start: by software, from the sampling interrupt. TIM1 to TIM5 and TIM8 are the only timers that can trigger ADC1, and all of
+//! them count encoders. The interrupt's jitter therefore moves scan and latch together, and their distance stays.
 //!
 //! The converter has no self-calibration (its gain and offset are trimmed in the factory); what is left of its errors is part of
 //! the LVDT's polynomial, which is found with the converter in place. Full scale is VDDA, so the supply's drift is gain.
@@ -28,15 +28,16 @@ use core::sync::atomic::{AtomicU16, Ordering, fence};
 
 use ballbar_firmware::{LvdtScan, TriggeredAdc};
 use stm32f4xx_hal::dma::config::Priority;
-use stm32f4xx_hal::dma::traits::{DmaFlagExt, Stream, StreamISR};
+use stm32f4xx_hal::dma::traits::{Stream, StreamISR};
 use stm32f4xx_hal::dma::{DmaChannel, DmaDataSize, DmaDirection, StreamX, StreamsTuple};
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, DMA2};
+use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 
 const CONVERSIONS: u16 = 16;
 const SIGNAL_CHANNEL: u8 = 10;
 const REFERENCE_CHANNEL: u8 = 11;
-const LAST_STEP: u16 = 4095;
+const LAST_STEP: i32 = 4095;
 
 /// Time from the latch of the encoders to the middle of the signal's conversions, nanoseconds.
 pub(crate) const DELAY_NS: u32 = {
@@ -45,8 +46,8 @@ pub(crate) const DELAY_NS: u32 = {
     const CONVERSION_CYCLES: u32 = SAMPLING_CYCLES + 12;
     // A conversion holds the voltage of the end of its sampling. Those of the signal are number 0, 2, .. 14: 7 on average.
     const MEAN_HOLD_CYCLES: u32 = 7 * CONVERSION_CYCLES + SAMPLING_CYCLES;
-    // From the middle of the latch to the start, some 250 cycles of 168 MHz: estimated from the instructions, not measured.
-    const START_AFTER_LATCH_NS: u32 = 1_500;
+    // From the middle of the latch to the start, some 420 cycles of 168 MHz: estimated from the instructions, not measured.
+    const START_AFTER_LATCH_NS: u32 = 2_500;
     MEAN_HOLD_CYCLES * 1_000 / ADC_CLOCK_MHZ + START_AFTER_LATCH_NS
 };
 
@@ -128,7 +129,7 @@ impl TriggeredAdc for Lvdt {
         if !self.running {
             return None;
         }
-        if !self.stream.flags().is_transfer_complete() || self.adc.sr().read().ovr().is_overrun() {
+        if !self.stream.is_transfer_complete() || self.adc.sr().read().ovr().is_overrun() {
             self.abort();
             return None;
         }
@@ -141,15 +142,16 @@ impl TriggeredAdc for Lvdt {
 /// Sums a scan's conversions; the even ones are the signal's.
 fn scan(converted: &[AtomicU16]) -> LvdtScan {
     let mut difference = 0;
-    let mut saturated = false;
+    // Negative once a step stood at 0 or at the last one: no branch, as this delays the start of the next scan.
+    let mut inside = 0;
     for pair in converted.chunks_exact(2) {
-        let [signal, reference] = [&pair[0], &pair[1]].map(|step| step.load(Ordering::Relaxed));
-        difference += i32::from(signal) - i32::from(reference);
-        saturated |= [signal, reference].iter().any(|&step| step == 0 || step >= LAST_STEP);
+        let [signal, reference] = [&pair[0], &pair[1]].map(|step| i32::from(step.load(Ordering::Relaxed)));
+        difference += signal - reference;
+        inside |= (signal - 1) | (LAST_STEP - 1 - signal) | (reference - 1) | (LAST_STEP - 1 - reference);
     }
     let code = 32_768 + 2 * difference;
     let held = code.clamp(0, i32::from(u16::MAX));
-    LvdtScan { code: held as u16, saturated: saturated || held != code }
+    LvdtScan { code: held as u16, saturated: inside < 0 || held != code }
 }
 
 /// Signal, reference, signal, and so on.

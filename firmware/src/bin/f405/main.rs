@@ -22,7 +22,6 @@ use defmt_rtt as _;
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use ballbar_firmware::{Board, SampleQueue, Sampler};
-    use stm32f4xx_hal::prelude::*;
 
     use crate::board::F405;
     use crate::clock::Clock;

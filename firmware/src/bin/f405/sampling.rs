@@ -2,13 +2,13 @@
 
 #![allow(unsafe_code)] // the interrupt clears its flag while the main loop owns the timer
 
+use ballbar_firmware::RATE_DEFAULT_HZ;
 use stm32f4xx_hal::pac::TIM7;
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 /// 84 MHz / 14. Whole microseconds at the usual rates, and 16 bits still hold a period of 100 Hz.
 const TICK_HZ: u32 = 6_000_000;
 const PRESCALER: u16 = 14;
-const RATE_AT_START_HZ: u16 = 1_000;
 
 /// The running timer.
 pub(crate) struct SamplingTimer {
@@ -16,13 +16,13 @@ pub(crate) struct SamplingTimer {
 }
 
 impl SamplingTimer {
-    /// Starts at a thousand samples a second.
+    /// Starts at [`RATE_DEFAULT_HZ`].
     pub(crate) fn start(timer: TIM7, rcc: &mut Rcc) -> Self {
         TIM7::enable(rcc);
         TIM7::reset(rcc);
         timer.psc().write(|w| w.psc().set(PRESCALER - 1));
         let mut timer = Self { timer };
-        timer.set_rate_hz(RATE_AT_START_HZ);
+        timer.set_rate_hz(RATE_DEFAULT_HZ);
         // Takes the prescaler and the first period over; without it the first period would be 65,536 ticks of 84 MHz.
         timer.timer.egr().write(|w| w.ug().update());
         timer.timer.sr().write(|w| w.uif().clear());
