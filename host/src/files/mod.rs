@@ -14,9 +14,9 @@ mod source;
 mod write;
 
 pub use builtin::{RIGS, ROBOTS};
-pub use poses::{Dataset, PoseRow, RowWarning, write_poses};
+pub use poses::{Dataset, PoseRow, RowWarning, pose_header, pose_record, write_poses};
 pub use problem::Problem;
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
-pub use robot::{Calibration, Coupling, EncoderFacts, JointLimits, Robot};
+pub use robot::{Calibration, EncoderFacts, JointLimits, NoEncoders, Robot};
 pub use source::{InputError, Source};
 pub use write::{WriteError, write_atomically};

@@ -31,6 +31,8 @@ pub(super) enum Range {
     Scale,
     /// Encoder counts per turn or millimetre.
     Counts,
+    /// Encoder counts from one index pulse to the next.
+    IndexCounts,
     /// Finite.
     Finite,
 }
@@ -45,6 +47,7 @@ impl Range {
             Self::Deviation => (1e-6..=MOST).contains(&x),
             Self::Scale => (1e-3..=1e3).contains(&x.abs()),
             Self::Counts => x > 0.0 && x <= 1e12,
+            Self::IndexCounts => (16.0..=1e6).contains(&x) && x.fract() == 0.0,
             Self::Finite => x.is_finite(),
         }
     }
@@ -57,6 +60,7 @@ impl Range {
             Self::Deviation => "a number from 1e-6 to 1e6",
             Self::Scale => "a number of size 0.001 to 1000",
             Self::Counts => "a number above 0, at most 1e12",
+            Self::IndexCounts => "a whole number from 16 to 1e6",
             Self::Finite => "a finite number",
         }
     }

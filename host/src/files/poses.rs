@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::fmt;
 
-use ballbar::{JointKind, Measurement};
+use ballbar::{JointKind, JointVector, Measurement};
 
 use super::rig::{PairingId, Rig};
 use super::robot::Robot;
@@ -113,26 +113,45 @@ impl Dataset {
 pub fn write_poses(robot: &Robot, rig: &Rig, rows: &[PoseRow]) -> String {
     let kinds = robot.chain.joint_kinds();
     let has_set = rows.iter().any(|row| row.set.is_some());
-    let mut header = vec!["chuck".to_owned(), "sphere".to_owned()];
-    header.extend(kinds.iter().enumerate().map(|(i, &kind)| joint_column(i, kind)));
-    header.push("length_mm".to_owned());
-    header.extend(has_set.then(|| "set".to_owned()));
-
-    let lines = rows.iter().map(|row| {
-        let mut fields = vec![rig.chucks[row.pairing.chuck].name.clone(), rig.spheres[row.pairing.sphere].name.clone()];
-        // Nanometres and nanodegrees: far below any encoder, and short enough to read.
-        let q = kinds.iter().zip(row.measurement.q.as_array());
-        fields.extend(q.map(|(&kind, &q)| format!("{:.9}", ScreenUnit::from(kind).from_si(q))));
-        fields.push(format!("{:.6}", mm_from_m(row.measurement.length_m)));
-        fields.extend(has_set.then(|| row.set.clone().unwrap_or_default()));
-        fields
-    });
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for record in std::iter::once(header).chain(lines) {
-        // Writing to memory cannot fail.
-        let _ = writer.write_record(record);
+    let mut text = pose_header(kinds, if has_set { &["set"] } else { &[] }) + "\n";
+    for row in rows {
+        let (chuck, sphere) = (&rig.chucks[row.pairing.chuck].name, &rig.spheres[row.pairing.sphere].name);
+        let set = has_set.then(|| row.set.clone().unwrap_or_default());
+        let Measurement { q, length_m, .. } = &row.measurement;
+        text += &(pose_record(chuck, sphere, kinds, q, *length_m, set.as_slice()) + "\n");
     }
-    String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
+    text
+}
+
+/// The first line of a file of poses, with optional columns at its end.
+pub fn pose_header(kinds: &[JointKind], optional: &[&str]) -> String {
+    let joints = kinds.iter().enumerate().map(|(i, &kind)| joint_column(i, kind));
+    let columns = ["chuck", "sphere"].map(str::to_owned).into_iter().chain(joints).chain(["length_mm".to_owned()]);
+    csv_record(columns.chain(optional.iter().map(|&column| column.to_owned())))
+}
+
+/// One line of a file of poses, without its end, with the fields of the optional columns.
+pub fn pose_record(
+    chuck: &str,
+    sphere: &str,
+    kinds: &[JointKind],
+    q: &JointVector<f64>,
+    length_m: f64,
+    optional: &[String],
+) -> String {
+    // Nanometres and nanodegrees: far below any encoder, and short enough to read.
+    let joints = kinds.iter().zip(q.as_array()).map(|(&kind, &q)| format!("{:.9}", ScreenUnit::from(kind).from_si(q)));
+    let length = format!("{:.6}", mm_from_m(length_m));
+    let fields = [chuck, sphere].map(str::to_owned).into_iter().chain(joints).chain([length]);
+    csv_record(fields.chain(optional.iter().cloned()))
+}
+
+fn csv_record(fields: impl Iterator<Item = String>) -> String {
+    let mut writer = csv::WriterBuilder::new().terminator(csv::Terminator::Any(b'\n')).from_writer(Vec::new());
+    // Writing to memory cannot fail.
+    let _ = writer.write_record(fields.collect::<Vec<_>>());
+    let text = String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default();
+    text.trim_end_matches('\n').to_owned()
 }
 
 /// Name of a joint's column: `q1_deg`, `q3_mm`.

@@ -82,15 +82,13 @@ pub enum Problem {
         /// Upper limit as in the file.
         max: f64,
     },
-    /// Coupling to a joint that does not exist or is the joint itself.
-    #[error("joint {joint} is coupled to joint {to}, expected another of the {joints} joints")]
+    /// Coupling to a joint that is not nearer to the base, or twice to the same.
+    #[error("joint {joint} is coupled to joint {to}, expected a joint nearer to the base, and each once")]
     Coupling {
         /// Number of the joint, from 1.
         joint: usize,
         /// The joint it is coupled to.
         to: usize,
-        /// Joints of the robot.
-        joints: usize,
     },
     /// No chuck or no sphere in a rig.
     #[error("no {0}, expected at least one")]
@@ -201,7 +199,9 @@ impl Problem {
             Self::JointKeyMissing { .. } => "A joint needs type, offset, scale and both limits.",
             Self::NotANumber { .. } => "Write a plain decimal number with a point.",
             Self::Limits { .. } => "Limits are those of the encoder output q.",
-            Self::Coupling { .. } => "`coupling = { joint = 5, ratio = 0.18 }` on joint 6: it turns by 0.18 of joint 5's turn.",
+            Self::Coupling { .. } => {
+                "`coupling = { joint = 5, ratio = 0.18 }` on joint 6: it turns by 0.18 of joint 5's turn. Several are a list: [{ … }, { … }]."
+            }
             Self::Empty(_) => "A rig needs chucks and spheres.",
             Self::Duplicate { .. } => "Give each a name of its own.",
             Self::Name(_) => "Poses and pairings (A:1,B:2) refer to chucks and spheres by these names.",

@@ -1,9 +1,14 @@
 //! `robot.toml`: a chain, its limits and encoders, and when and from what it was calibrated.
 
+use std::fmt;
 use std::ops::Range;
 
-use ballbar::{Chain, JointKind, MAX_JOINTS};
-use serde::{Deserialize, Serialize};
+use ballbar::{Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, MAX_JOINTS};
+use miette::Diagnostic;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use thiserror::Error;
 use toml::Spanned;
 use toml_edit::{DocumentMut, Item, Table, value};
 
@@ -29,6 +34,15 @@ pub struct Robot {
     source: Source,
 }
 
+/// A robot's file says too little of its encoders for a board to count with them.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{robot}: {reason}, which the board needs to know")]
+#[diagnostic(help("Give every joint `counts_per_rev` (or `counts_per_mm`) and `sign`; see docs/files.md."))]
+pub struct NoEncoders {
+    robot: String,
+    reason: String,
+}
+
 /// Limits of a joint's encoder output q, radians or metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
@@ -46,23 +60,12 @@ impl JointLimits {
 }
 
 /// How a joint's encoder counts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct EncoderFacts {
-    /// Counts, after quadrature and gearing, per radian or metre of the joint; `None` where the file does not say.
-    pub counts_per_unit: Option<f64>,
-    /// Whether counts rise when the joint turns the positive way.
-    pub rises: bool,
-    /// Another joint whose motion turns this one.
-    pub coupling: Option<Coupling>,
-}
-
-/// A joint that is turned along by another one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coupling {
-    /// Index of the other joint, from 0.
-    pub joint: usize,
-    /// Turn of this joint per turn of the other.
-    pub ratio: f64,
+    /// Counts per radian or metre, and from index to index; `None` where the file does not say.
+    pub encoder: Option<Encoder<f64>>,
+    /// Joints nearer to the base whose motion turns this one along.
+    pub couplings: Vec<Coupling<f64>>,
 }
 
 /// When, from what and how well a robot was calibrated.
@@ -120,15 +123,44 @@ struct JointToml {
     max_mm: Option<Spanned<f64>>,
     counts_per_rev: Option<Spanned<f64>>,
     counts_per_mm: Option<Spanned<f64>>,
+    counts_per_index: Option<Spanned<f64>>,
     sign: Option<Spanned<f64>>,
-    coupling: Option<Spanned<CouplingToml>>,
+    coupling: Option<CouplingsToml>,
 }
+
+/// One table or a list of them.
+struct CouplingsToml(Vec<CouplingToml>);
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CouplingToml {
-    joint: usize,
+    joint: Spanned<usize>,
     ratio: Spanned<f64>,
+}
+
+impl<'de> Deserialize<'de> for CouplingsToml {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // By hand, since serde's untagged enums lose the places of what they hold.
+        deserializer.deserialize_any(CouplingsVisitor)
+    }
+}
+
+struct CouplingsVisitor;
+
+impl<'de> Visitor<'de> for CouplingsVisitor {
+    type Value = CouplingsToml;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a coupling { joint = 5, ratio = 0.18 } or a list of them")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<CouplingsToml, A::Error> {
+        Ok(CouplingsToml(vec![CouplingToml::deserialize(MapAccessDeserializer::new(map))?]))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<CouplingsToml, A::Error> {
+        Ok(CouplingsToml(Vec::deserialize(SeqAccessDeserializer::new(seq))?))
+    }
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -170,7 +202,7 @@ impl Robot {
             parameters.extend(vector(source, "translation_mm", &link.translation_mm)?.map(m_from_mm));
             parameters.extend(vector(source, "rotation_deg", &link.rotation_deg)?.map(f64::to_radians));
             if let Some(joint) = file.joints.get(i) {
-                let reader = JointReader { source, number: i + 1, joints, span: joint.span(), joint: joint.as_ref() };
+                let reader = JointReader { source, number: i + 1, span: joint.span(), joint: joint.as_ref() };
                 let (kind, offset, scale) = reader.model()?;
                 kinds.push(kind);
                 parameters.extend([offset, scale]);
@@ -181,6 +213,25 @@ impl Robot {
         let chain = Chain::new(&kinds, &parameters).map_err(|error| of_file(Problem::Toml(error.to_string())))?;
         let name = file.name.unwrap_or_else(|| source.name().to_owned());
         Ok(Self { name, chain, limits, encoders, calibration: file.calibration, source: source.clone() })
+    }
+
+    /// The map between encoder positions and joint values.
+    ///
+    /// # Errors
+    /// [`NoEncoders`] when the file does not say how every joint counts.
+    pub fn joint_encoders(&self) -> Result<JointEncoders<f64>, NoEncoders> {
+        let missing = self.encoders.iter().position(|facts| facts.encoder.is_none());
+        let because = |reason| NoEncoders { robot: self.source_name().to_owned(), reason };
+        if let Some(i) = missing {
+            let key = match self.chain.joint_kinds()[i] {
+                JointKind::Revolute => "counts_per_rev",
+                JointKind::Prismatic => "counts_per_mm",
+            };
+            return Err(because(format!("joint {} has no `{key}`", i + 1)));
+        }
+        let encoders: Vec<_> = self.encoders.iter().filter_map(|facts| facts.encoder).collect();
+        let couplings: Vec<_> = self.encoders.iter().flat_map(|facts| facts.couplings.iter().copied()).collect();
+        JointEncoders::new(&encoders, &couplings).map_err(|error: EncoderError| because(error.to_string()))
     }
 
     /// The file or built-in that this robot was read from.
@@ -216,7 +267,6 @@ impl Robot {
 struct JointReader<'a> {
     source: &'a Source,
     number: usize,
-    joints: usize,
     span: Range<usize>,
     joint: &'a JointToml,
 }
@@ -260,10 +310,14 @@ impl JointReader<'_> {
             JointKind::Revolute => std::f64::consts::TAU,
             JointKind::Prismatic => m_from_mm(1.0),
         };
+        let counts_per_index = match &self.joint.counts_per_index {
+            Some(counts) => in_range(self.source, "counts_per_index", counts, Of::IndexCounts)? as u32,
+            None => 0,
+        };
+        let sign = if self.rises()? { 1.0 } else { -1.0 };
         Ok(EncoderFacts {
-            counts_per_unit: counts.map(|counts| counts / unit_si),
-            rises: self.rises()?,
-            coupling: self.coupling()?,
+            encoder: counts.map(|counts| Encoder { counts_per_unit: sign * counts / unit_si, counts_per_index }),
+            couplings: self.couplings()?,
         })
     }
 
@@ -279,15 +333,19 @@ impl JointReader<'_> {
         }
     }
 
-    fn coupling(&self) -> Result<Option<Coupling>, InputError> {
-        let Some(coupling) = &self.joint.coupling else { return Ok(None) };
-        let to = coupling.as_ref().joint;
-        if !(1..=self.joints).contains(&to) || to == self.number {
-            let problem = Problem::Coupling { joint: self.number, to, joints: self.joints };
-            return Err(InputError::at(self.source, coupling.span(), problem));
+    fn couplings(&self) -> Result<Vec<Coupling<f64>>, InputError> {
+        let list = self.joint.coupling.as_ref().map_or(&[][..], |couplings| &couplings.0);
+        let mut couplings: Vec<Coupling<f64>> = Vec::new();
+        for CouplingToml { joint, ratio } in list {
+            let to = *joint.as_ref();
+            let is_nearer = (1..self.number).contains(&to);
+            if !is_nearer || couplings.iter().any(|other| usize::from(other.driven_by) == to - 1) {
+                return Err(InputError::at(self.source, joint.span(), Problem::Coupling { joint: self.number, to }));
+            }
+            let ratio = in_range(self.source, "ratio", ratio, Of::Plausible)?;
+            couplings.push(Coupling { joint: (self.number - 1) as u8, driven_by: (to - 1) as u8, ratio });
         }
-        let ratio = in_range(self.source, "ratio", &coupling.as_ref().ratio, Of::Plausible)?;
-        Ok(Some(Coupling { joint: to - 1, ratio }))
+        Ok(couplings)
     }
 
     /// The value of a key that has one name for angles and one for slides, in SI, and its place in the text.

@@ -31,7 +31,6 @@ min_deg = -170.0
 max_deg = 170.0
 counts_per_rev = 8192
 sign = 1
-coupling = { joint = 2, ratio = 0.5 }
 
 [[joints]]
 type = "prismatic"
@@ -39,6 +38,7 @@ offset_mm = 10.0
 scale = 1.0
 min_mm = 0.0
 max_mm = 500.0
+coupling = { joint = 1, ratio = 0.5 }
 "#;
 
 pub const RIG: &str = r#"[[chucks]]
