@@ -2,18 +2,25 @@
 //!
 //! | module | holds |
 //! | --- | --- |
+//! | [`board`] | the host's end of the wire: port, requests, losses |
+//! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
 //! | [`simulate`] | poses on hemispherical shells, simulated lengths, tool error over the workspace |
+//! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
 //! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
 //!
 //! SI units inside; millimetres and degrees in files and on screens, converted at the edge (see [`units`]).
 #![forbid(unsafe_code)]
 
+pub mod board;
 pub mod cmd;
 pub mod files;
 pub mod identify;
 pub mod paper;
+pub mod session;
 pub mod simulate;
 pub mod units;
+#[cfg(unix)]
+pub mod virtual_board;

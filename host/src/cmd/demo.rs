@@ -1,4 +1,6 @@
-//! `host-cal demo`: a calibration from nothing to proof, without hardware.
+//! `host-cal demo`: a calibration from nothing to proof, without hardware: through the board's own firmware and over its wire.
+
+mod bench;
 
 use std::path::{Path, PathBuf};
 
@@ -7,16 +9,19 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::apply::upload;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, progress, write_calibrated, write_file};
+use super::report::{Report, print, write_calibrated, write_file};
 use super::table::Columns;
-use crate::files::{Dataset, RIGS, ROBOTS, Rig, Robot, Source, write_poses};
+use crate::board::{StreamLosses, rms_kinematics};
+use crate::files::{Dataset, RIGS, ROBOTS, Rig, Robot, Source};
 use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
-use crate::simulate::{Shells, tool_error};
-use crate::units::{m_from_mm, mm_from_m};
+use crate::simulate::tool_error;
+use crate::units::mm_from_m;
+use bench::{Bench, SIGMA_MM, Scene};
 
-/// See a whole calibration without hardware: simulate, fit, prove
+/// See a whole calibration without hardware: stream, settle, fit, validate, apply, verify
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  host-cal demo --out my-demo\n\nThe files it leaves are what the other commands read; what it prints last are commands to try on them."
@@ -43,6 +48,11 @@ struct DemoReport {
     other_shells: Change,
     tool: Change,
     tool_max: Change,
+    /// Of the poses that the board itself computes, over the same workspace.
+    board_tool: Change,
+    /// Between the board's kinematics and this program's, with the parameters just stored.
+    board_difference_um: f64,
+    losses: StreamLosses,
     files: Vec<String>,
     #[serde(skip)]
     folder: String,
@@ -72,41 +82,47 @@ struct ForeignFolderError {
 
 /// What the demo printed, left among its files; by it the demo knows its own folder again.
 const SUMMARY_NAME: &str = "demo.txt";
-const SIGMA_MM: f64 = 0.084;
 const FITTED_BAR_MM: f64 = 460.0;
 const OTHER_BAR_MM: f64 = 610.0;
-const POSES_PER_PAIRING: usize = 90;
 const WORKSPACE_POSES: usize = 5_000;
+/// Joint vectors at which the board is asked where the tool is.
+const BOARD_POSES: usize = 300;
 
 impl DemoArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        let (design, truth, rig) = (Robot::open("puma560")?, Robot::open("puma560-optimised")?, Rig::open("triangles")?);
+        let scene =
+            Scene { design: Robot::open("puma560")?, truth: Robot::open("puma560-optimised")?, rig: Rig::open("triangles")? };
+        let Scene { design, rig, .. } = &scene;
         self.prepare_folder()?;
 
-        let fitted_csv = self.simulate("simulating 46 cm shells", FITTED_BAR_MM, self.seed, &design, &truth, &rig)?;
-        let other_csv =
-            self.simulate("simulating 61 cm shells", OTHER_BAR_MM, self.seed.wrapping_add(1), &design, &truth, &rig)?;
+        let mut bench = Bench::power_up(&scene, self.seed)?;
+        let fitted_shells = bench.collect("46 cm shells", FITTED_BAR_MM, self.seed)?;
+        let other_shells = bench.collect("61 cm shells", OTHER_BAR_MM, self.seed.wrapping_add(1))?;
         let (fitted_name, other_name) = ("poses-460.csv", "poses-610.csv");
         let mut fitted_poses = Dataset::default();
-        fitted_poses.append(&Source::new(fitted_name, &fitted_csv), &design, &rig)?;
+        fitted_poses.append(&Source::new(fitted_name, &fitted_shells.csv), design, rig)?;
         let mut other_poses = Dataset::default();
-        other_poses.append(&Source::new(other_name, &other_csv), &design, &rig)?;
+        other_poses.append(&Source::new(other_name, &other_shells.csv), design, rig)?;
 
-        let fit = fit(&design, &fitted_poses, &FitOptions::default())?;
+        let fit = fit(design, &fitted_poses, &FitOptions::default())?;
         let files = [
             ("design.toml", Source::named_or_read("puma560", &ROBOTS, "robot")?.text().to_owned()),
             ("rig.toml", Source::named_or_read("triangles", &RIGS, "rig")?.text().to_owned()),
-            (fitted_name, fitted_csv),
-            (other_name, other_csv),
+            (fitted_name, fitted_shells.csv),
+            (other_name, other_shells.csv),
         ];
         for (name, text) in &files {
             write_file(&self.out.join(name), text)?;
         }
         let calibrated_name = "calibrated.toml";
-        write_calibrated(&self.out.join(calibrated_name), &design, &fitted_poses, &fit)?;
+        let calibrated_path = self.out.join(calibrated_name);
+        write_calibrated(&calibrated_path, design, &fitted_poses, &fit)?;
+
+        let board = put_on_board(&mut bench, &scene.truth, &Robot::open(&calibrated_path.to_string_lossy())?)?;
         let names = files.iter().map(|(name, _)| *name).chain([calibrated_name]);
         let names = names.chain([SUMMARY_NAME]).map(|name| self.out.join(name).display().to_string()).collect();
-        let report = DemoReport::new(&design, &truth, &fit, &other_poses, names, &self.out);
+        let losses = fitted_shells.losses + other_shells.losses;
+        let report = DemoReport::new(&scene, &fit, &other_poses, board, losses, names, &self.out);
         write_file(&self.out.join(SUMMARY_NAME), &report.text())?;
         print(&report, self.output.json)?;
         Ok(if fit.objection().is_none() { Outcome::Good } else { Outcome::Doubtful })
@@ -122,39 +138,36 @@ impl DemoArgs {
         }
         write_file(&self.out.join(SUMMARY_NAME), "")
     }
+}
 
-    /// Poses of all pairings as the text of a file: what goes on is what a reader of the file would get.
-    fn simulate(
-        &self,
-        what: &'static str,
-        bar_mm: f64,
-        seed: u64,
-        design: &Robot,
-        truth: &Robot,
-        rig: &Rig,
-    ) -> Result<String, CommandError> {
-        let pairings = rig.all_pairings();
-        let shells = Shells {
-            planned_with: design,
-            truth,
-            rig,
-            pairings: &pairings,
-            bar_m: m_from_mm(bar_mm),
-            per_pairing: POSES_PER_PAIRING,
-            sigma_m: m_from_mm(SIGMA_MM),
-            seed,
-        };
-        let bar = progress((pairings.len() * POSES_PER_PAIRING) as u64, what);
-        let poses = shells.simulate(|| bar.inc(1))?;
-        bar.finish_and_clear();
-        let rows: Vec<_> = poses.into_iter().map(|pose| pose.row).collect();
-        Ok(write_poses(truth, rig, &rows))
-    }
+/// What the board computes.
+struct OnBoard {
+    tool: Change,
+    difference_um: f64,
+}
+
+/// Puts the calibrated robot on the board; the board's own poses against the true robot's, before and after.
+fn put_on_board(bench: &mut Bench<'_>, truth: &Robot, calibrated: &Robot) -> Result<OnBoard, CommandError> {
+    let before_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES)?;
+    let applied = upload(&mut bench.link, calibrated, BOARD_POSES)?;
+    let after_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES)?;
+    Ok(OnBoard {
+        tool: Change { before_mm: mm_from_m(before_m), after_mm: mm_from_m(after_m) },
+        difference_um: applied.max_position_difference_um,
+    })
 }
 
 impl DemoReport {
-    fn new(design: &Robot, truth: &Robot, fit: &Fit, other: &Dataset, files: Vec<String>, folder: &Path) -> Self {
-        let fitted = &fit.solution.chain;
+    fn new(
+        scene: &Scene,
+        fit: &Fit,
+        other: &Dataset,
+        board: OnBoard,
+        losses: StreamLosses,
+        files: Vec<String>,
+        folder: &Path,
+    ) -> Self {
+        let (Scene { design, truth, .. }, fitted) = (scene, &fit.solution.chain);
         let rms = |chain| ResidualSummary::new(&residuals(chain, other)).rms_m;
         let change = |before_m, after_m| Change { before_mm: mm_from_m(before_m), after_mm: mm_from_m(after_m) };
         let tool = |chain| tool_error(&truth.chain, chain, &truth.limits, WORKSPACE_POSES, 0);
@@ -169,6 +182,9 @@ impl DemoReport {
             other_shells: change(rms(&design.chain), rms(fitted)),
             tool: change(before.rms_m, after.rms_m),
             tool_max: change(before.max_m, after.max_m),
+            board_tool: board.tool,
+            board_difference_um: board.difference_um,
+            losses,
             files,
             folder: folder.display().to_string(),
         }
@@ -179,9 +195,17 @@ impl Report for DemoReport {
     fn text(&self) -> String {
         let mut text = format!(
             "A PUMA 560 whose controller believes the design parameters, while the arm has those that the paper found.\n\
-             {} lengths from three chucks to three spheres on 46 cm shells, each with {} mm of noise.\n\
+             The board's firmware runs in this process, behind a serial port; {} lengths on 46 cm shells, from three chucks to three\n\
+             spheres, each with {} mm of noise, came over it while the arm stood still: {}.\n\
              Fit {}: {} parameters identified.\n\n",
-            self.poses, self.sigma_mm, self.status, self.free_parameters
+            self.poses,
+            self.sigma_mm,
+            match self.losses.missing + self.losses.overruns {
+                0 => "nothing was lost".to_owned(),
+                lost => format!("{lost} messages were LOST"),
+            },
+            self.status,
+            self.free_parameters
         );
         let mut table = Columns::new(&["<", "design", "calibrated"]);
         let change = |change: &Change| [format!("{:.3} mm", change.before_mm), format!("{:.3} mm", change.after_mm)];
@@ -191,10 +215,15 @@ impl Report for DemoReport {
             ("RMS of lengths never seen, 61 cm shells", change(&self.other_shells)),
             ("tool position error over the workspace, RMS", change(&self.tool)),
             ("tool position error over the workspace, largest", change(&self.tool_max)),
+            ("the same, of poses that the board computes, RMS", change(&self.board_tool)),
         ] {
             table.row([what.to_owned()].into_iter().chain(numbers));
         }
         text += &table.text();
+        text += &format!(
+            "\nThe calibrated parameters are in the board's flash; its poses and this program's differ by {:.2} µm at most.\n",
+            self.board_difference_um
+        );
         text += &format!("\nLeft in {}: {}\n", self.folder, self.files.join(" "));
         let at = |name: &str| quoted(&Path::new(&self.folder).join(name));
         let (design, rig, fitted, other, calibrated) =

@@ -3,18 +3,29 @@
 //! Every command reads its inputs whole, computes a report and prints it: as text for people, or as the one JSON document of
 //! `--json`. Progress and warnings go to stderr.
 
+mod apply;
 mod demo;
 mod fit;
 mod fk;
+mod home;
 mod inputs;
 mod lines;
+mod log;
+mod lvdt;
 mod outcome;
 mod paper;
+mod port;
+mod ports;
+mod pose;
 mod rank;
 mod report;
 mod simulate;
+mod status;
+mod stream;
 mod table;
 mod validate;
+#[cfg(unix)]
+mod virtual_board;
 
 use clap::{Parser, Subcommand};
 
@@ -42,6 +53,16 @@ enum Command {
     Fk(fk::FkArgs),
     Simulate(simulate::SimulateArgs),
     Paper(paper::PaperArgs),
+    Ports(ports::PortsArgs),
+    Stream(stream::StreamArgs),
+    Log(log::LogArgs),
+    Status(status::StatusArgs),
+    Home(home::HomeArgs),
+    Lvdt(lvdt::LvdtArgs),
+    Apply(apply::ApplyArgs),
+    Pose(pose::PoseArgs),
+    #[cfg(unix)]
+    VirtualBoard(virtual_board::VirtualBoardArgs),
     Demo(demo::DemoArgs),
 }
 
@@ -58,6 +79,16 @@ impl Cli {
             Command::Fk(args) => args.run(),
             Command::Simulate(args) => args.run(),
             Command::Paper(args) => args.run(),
+            Command::Ports(args) => args.run(),
+            Command::Stream(args) => args.run(),
+            Command::Log(args) => args.run(),
+            Command::Status(args) => args.run(),
+            Command::Home(args) => args.run(),
+            Command::Lvdt(args) => args.run(),
+            Command::Apply(args) => args.run(),
+            Command::Pose(args) => args.run(),
+            #[cfg(unix)]
+            Command::VirtualBoard(args) => args.run(),
             Command::Demo(args) => args.run(),
         }
     }

@@ -1,0 +1,17 @@
+//! The host's end of the wire: the serial port, requests and their replies, and what the stream lost.
+
+mod errors;
+mod link;
+mod lvdt_fit;
+mod port;
+mod robot_on_board;
+mod tally;
+mod verify;
+
+pub use errors::{BoardError, PortError};
+pub use link::{BoardLink, Frame};
+pub use lvdt_fit::{LvdtFitError, LvdtPoint, fit_lvdt};
+pub use port::{BAUD, Port};
+pub use robot_on_board::{RobotOnBoard, SetError, nominal_lvdt, parameter_set};
+pub use tally::{StreamLosses, StreamTally};
+pub use verify::{KinematicsDifference, rms_kinematics, verify_kinematics};

@@ -1,0 +1,148 @@
+//! A robot's file as the board's parameters, and the board's parameters as something to compute with in f64.
+
+use ballbar::wire::{Answer, Command, ParameterSet, Refusal, WhichSet};
+use ballbar::{Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose};
+use miette::Diagnostic;
+use thiserror::Error;
+
+use super::errors::BoardError;
+use super::link::BoardLink;
+use crate::files::{NoEncoders, Robot};
+
+/// Why a robot's file cannot be put on a board.
+#[derive(Debug, Error, Diagnostic)]
+pub enum SetError {
+    /// It says too little of the encoders.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Encoders(#[from] NoEncoders),
+    /// A number is too large for the board's single precision.
+    #[error("{robot}: {reason}")]
+    Unfit {
+        /// The file.
+        robot: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// The parameters of a robot's file, rounded to the board's f32, with an LVDT curve.
+///
+/// # Errors
+/// [`SetError`] when the file lacks encoders, or the board could not use it.
+pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, SetError> {
+    robot.joint_encoders()?;
+    let encoders = robot.encoders.iter().filter_map(|facts| facts.encoder);
+    let couplings = robot.encoders.iter().flat_map(|facts| &facts.couplings);
+    let set = ParameterSet {
+        name: cut_to(&robot.name, 32),
+        is_calibrated: robot.calibration.is_some(),
+        kinds: robot.chain.joint_kinds().iter().copied().collect(),
+        parameters: robot.chain.parameters().iter().map(|&value| value as f32).collect(),
+        encoders: encoders
+            .map(|e| Encoder { counts_per_unit: e.counts_per_unit as f32, counts_per_index: e.counts_per_index })
+            .collect(),
+        couplings: couplings
+            .map(|c| Coupling { joint: c.joint, driven_by: c.driven_by, ratio: c.ratio as f32 })
+            .take(ballbar::MAX_COUPLINGS)
+            .collect(),
+        lvdt,
+    };
+    let unfit = |reason: String| SetError::Unfit { robot: robot.source_name().to_owned(), reason };
+    if robot.encoders.iter().map(|facts| facts.couplings.len()).sum::<usize>() > ballbar::MAX_COUPLINGS {
+        return Err(unfit(format!("more than {} couplings", ballbar::MAX_COUPLINGS)));
+    }
+    set.compile().map_err(|error| unfit(error.to_string()))?;
+    Ok(set)
+}
+
+/// A straight line over nine tenths of the codes: what a conditioner that is trimmed to its data sheet gives. Good enough to see
+/// the bar move; `host-cal lvdt` measures the real curve.
+pub fn nominal_lvdt(travel_m: f64) -> LvdtCurve {
+    let (code_min, code_max) = (1_638, 63_898);
+    let mut coefficients_m = [0.0; LVDT_COEFFICIENTS];
+    let span = LvdtCurve::normalised(f64::from(code_max)) - LvdtCurve::normalised(f64::from(code_min));
+    coefficients_m[1] = (travel_m / span) as f32;
+    LvdtCurve { code_min, code_max, coefficients_m }
+}
+
+/// The first bytes of a text, whole characters only.
+fn cut_to<const N: usize>(text: &str, bytes: usize) -> heapless::String<N> {
+    let mut cut = heapless::String::new();
+    for character in text.chars() {
+        if cut.len() + character.len_utf8() > bytes || cut.push(character).is_err() {
+            break;
+        }
+    }
+    cut
+}
+
+/// The parameters that a board uses, ready to convert what it streams.
+#[derive(Clone, Debug)]
+pub struct RobotOnBoard {
+    set: ParameterSet,
+    encoders: JointEncoders<f64>,
+}
+
+impl RobotOnBoard {
+    /// Asks the board; `None` when it holds no parameters. Returns the frame of the reply as well, for a log.
+    ///
+    /// # Errors
+    /// [`BoardError`].
+    pub fn read(link: &mut BoardLink) -> Result<Option<(Self, Vec<u8>)>, BoardError> {
+        match link.request_frame(Command::ReadParameters(WhichSet::Active)) {
+            Ok((Answer::Parameters(set), frame)) => Ok(Self::new(set).map(|robot| (robot, frame))),
+            Ok(_) => Err(BoardError::WrongAnswer { command: "read parameters" }),
+            Err(BoardError::Refused { refusal: Refusal::NoParameters, .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Takes a set that came from a board; `None` when it cannot be computed with.
+    pub fn new(set: ParameterSet) -> Option<Self> {
+        set.compile().ok()?;
+        let encoders: Vec<_> = set
+            .encoders
+            .iter()
+            .map(|e| Encoder { counts_per_unit: f64::from(e.counts_per_unit), counts_per_index: e.counts_per_index })
+            .collect();
+        let couplings: Vec<_> = set
+            .couplings
+            .iter()
+            .map(|c| Coupling { joint: c.joint, driven_by: c.driven_by, ratio: f64::from(c.ratio) })
+            .collect();
+        let encoders = JointEncoders::new(&encoders, &couplings).ok()?;
+        Some(Self { set, encoders })
+    }
+
+    /// The set as the board has it.
+    pub fn set(&self) -> &ParameterSet {
+        &self.set
+    }
+
+    /// Kinds of the joints.
+    pub fn kinds(&self) -> &[JointKind] {
+        &self.set.kinds
+    }
+
+    /// The map between counts and joint values.
+    pub fn encoders(&self) -> &JointEncoders<f64> {
+        &self.encoders
+    }
+
+    /// Joint values q, radians or metres, at encoder positions in counts.
+    pub fn q(&self, counts: impl IntoIterator<Item = f64>) -> JointVector<f64> {
+        self.encoders.q(counts)
+    }
+
+    /// Displacement of the bar from mid travel, metres; `None` at a fault of the LVDT.
+    pub fn displacement_m(&self, reading: LvdtReading) -> Option<f64> {
+        self.set.lvdt.displacement_m(reading).ok()
+    }
+
+    /// Joint values and displacement of a settled pose, in SI; no displacement when the bar was beyond its travel.
+    pub fn settled(&self, pose: &SettledPose) -> (JointVector<f64>, Option<f64>) {
+        let q = self.q(pose.counts_mean.iter().copied());
+        (q, self.set.lvdt.displacement_of_code_m(pose.code_mean).ok())
+    }
+}

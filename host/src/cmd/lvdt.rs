@@ -1,0 +1,205 @@
+//! `host-cal lvdt`: measure the LVDT's curve from known lengths.
+
+use std::io::{IsTerminal, Write, stderr, stdin};
+
+use ballbar::wire::{Answer, Command, Event, StreamSelection, ToHost};
+use ballbar::{LVDT_COEFFICIENTS, SettledPose, StillnessCriteria};
+use clap::Args;
+use miette::Diagnostic;
+use serde::Serialize;
+use thiserror::Error;
+
+use super::inputs::{ListError, OutputArgs};
+use super::outcome::{CommandError, Outcome};
+use super::port::{EndRequest, PortArgs};
+use super::report::{Report, print};
+use super::table::{Columns, fixed};
+use crate::board::{BoardError, BoardLink, LvdtPoint, RobotOnBoard, fit_lvdt};
+use crate::units::{m_from_mm, mm_from_m};
+
+/// Measure the LVDT's curve from known lengths, and store it on the board
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  host-cal lvdt /dev/ttyUSB0 --bar 460 --lengths 425,432,439,446,453,460,467,474,481,488,495\n\nSet the bar to each length in turn, as with gauge blocks or a micrometer stage, and hold it still until it is taken.\nThe curve is stored when it is within --tolerance-mm of every length."
+)]
+pub(super) struct LvdtArgs {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Length of the bar at mid travel, millimetres
+    #[arg(long, value_name = "MM")]
+    bar: f64,
+    /// The known lengths, in the order in which they will be set, millimetres
+    #[arg(long, value_delimiter = ',', required = true, value_name = "MM,…")]
+    lengths: Vec<f64>,
+    /// Degree of the polynomial
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..LVDT_COEFFICIENTS as i64))]
+    degree: u8,
+    /// How long each length must stand still, milliseconds
+    #[arg(long, default_value_t = 1000, value_name = "MS")]
+    hold_ms: u32,
+    /// Largest residual with which the curve is stored, millimetres
+    #[arg(long, default_value_t = 0.05, value_name = "MM")]
+    tolerance_mm: f64,
+    /// Fit and show the curve, and store nothing
+    #[arg(long)]
+    dry_run: bool,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+enum LvdtError {
+    #[error("the board holds no parameters, of which the curve is a part")]
+    #[diagnostic(help("Upload a robot first: host-cal apply PORT --robot robot.toml"))]
+    NoParameters,
+    #[error("ended before all lengths were measured: {found} of {wanted}")]
+    #[diagnostic(help("Nothing was changed on the board."))]
+    Ended { found: usize, wanted: usize },
+}
+
+#[derive(Serialize)]
+struct LvdtReport {
+    degree: u8,
+    points: Vec<PointLine>,
+    rms_mm: f64,
+    max_abs_mm: f64,
+    code_min: u16,
+    code_max: u16,
+    coefficients_mm: [f64; LVDT_COEFFICIENTS],
+    /// stored, not stored: too far off, or not stored: dry run.
+    outcome: &'static str,
+}
+
+#[derive(Serialize)]
+struct PointLine {
+    length_mm: f64,
+    code: f64,
+    code_std: f32,
+    residual_mm: f64,
+}
+
+impl LvdtArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        if let Some(bad) = self.lengths.iter().chain([&self.bar]).find(|mm| !(**mm > 0.0 && **mm <= 1e6)) {
+            let (flag, found) = ("--bar and --lengths", bad.to_string());
+            return Err(ListError::Number { flag, found, expected: "millimetres above 0, at most 1e6" }.into());
+        }
+        let mut link = self.port.connect()?;
+        RobotOnBoard::read(&mut link)?.ok_or(LvdtError::NoParameters)?;
+        let poses = self.measure(&mut link)?;
+        let point = |(&length_mm, pose): (&f64, &SettledPose)| LvdtPoint {
+            displacement_m: m_from_mm(length_mm - self.bar),
+            code: pose.code_mean,
+        };
+        let points: Vec<LvdtPoint> = self.lengths.iter().zip(&poses).map(point).collect();
+        let (curve, residuals_m) = fit_lvdt(&points, usize::from(self.degree))?;
+
+        let squares: f64 = residuals_m.iter().map(|m| m * m).sum();
+        let line = |((&length_mm, pose), &m): ((&f64, &SettledPose), &f64)| PointLine {
+            length_mm,
+            code: pose.code_mean,
+            code_std: pose.code_std,
+            residual_mm: mm_from_m(m),
+        };
+        let max_abs_mm = mm_from_m(residuals_m.iter().fold(0.0, |max: f64, m| max.max(m.abs())));
+        let outcome = match max_abs_mm <= self.tolerance_mm {
+            false => "not stored: too far off",
+            true if self.dry_run => "not stored: dry run",
+            true => {
+                store(&mut link, curve)?;
+                "stored"
+            }
+        };
+        let report = LvdtReport {
+            degree: self.degree,
+            points: self.lengths.iter().zip(&poses).zip(&residuals_m).map(line).collect(),
+            rms_mm: mm_from_m((squares / residuals_m.len() as f64).sqrt()),
+            max_abs_mm,
+            code_min: curve.code_min,
+            code_max: curve.code_max,
+            coefficients_mm: curve.coefficients_m.map(|m| mm_from_m(f64::from(m))),
+            outcome,
+        };
+        print(&report, self.output.json)?;
+        Ok(if max_abs_mm <= self.tolerance_mm { Outcome::Good } else { Outcome::Doubtful })
+    }
+
+    /// Takes one settled pose for each length.
+    fn measure(&self, link: &mut BoardLink) -> Result<Vec<SettledPose>, CommandError> {
+        let end = EndRequest::listen();
+        // The arm may do what it likes; only the LVDT has to stand.
+        let criteria = StillnessCriteria {
+            hold_us: self.hold_ms.saturating_mul(1_000),
+            band_counts: u16::MAX,
+            ..StillnessCriteria::default()
+        };
+        let mut poses = Vec::new();
+        for &length_mm in &self.lengths {
+            let _ = writeln!(stderr(), "set the bar to {length_mm} mm and hold it still");
+            let is_told = stdin().is_terminal();
+            if is_told {
+                let _ = write!(stderr(), "press Enter when it stands: ");
+                let _ = stdin().read_line(&mut String::new());
+            }
+            // Asked for anew, so that stillness before now does not count.
+            link.act(Command::SetStillness(criteria))?;
+            link.act(Command::StartStream(StreamSelection { settled: true, ..StreamSelection::default() }))?;
+            // Nobody says when the next length is set: a code that has not moved is still that of the last one.
+            let old_code = poses.last().map(|pose: &SettledPose| pose.code_mean).filter(|_| !is_told);
+            let is_new =
+                |pose: &SettledPose| old_code.is_none_or(|old| (pose.code_mean - old).abs() > f64::from(criteria.band_codes));
+            let pose = next_settled(link, &end, is_new)?;
+            link.act(Command::StopStream)?;
+            let pose = pose.ok_or(LvdtError::Ended { found: poses.len(), wanted: self.lengths.len() })?;
+            let _ = writeln!(stderr(), "  code {:.1} ± {:.1} over {} samples", pose.code_mean, pose.code_std, pose.samples);
+            poses.push(pose);
+        }
+        link.act(Command::SetStillness(StillnessCriteria::default()))?;
+        Ok(poses)
+    }
+}
+
+fn next_settled(
+    link: &mut BoardLink,
+    end: &EndRequest,
+    is_new: impl Fn(&SettledPose) -> bool,
+) -> Result<Option<SettledPose>, CommandError> {
+    while !end.is_made() {
+        if let Some(frame) = link.next_frame()?
+            && let ToHost::Stream(stream) = frame.message
+            && let Event::Settled(pose) = stream.event
+            && is_new(&pose)
+        {
+            return Ok(Some(pose));
+        }
+    }
+    let _ = link.act(Command::StopStream);
+    Ok(None)
+}
+
+fn store(link: &mut BoardLink, curve: ballbar::LvdtCurve) -> Result<(), CommandError> {
+    link.act(Command::Discard)?;
+    let Answer::Staged { crc } = link.request(Command::SetLvdt(curve))? else {
+        return Err(BoardError::WrongAnswer { command: "set LVDT" }.into());
+    };
+    Ok(link.act(Command::Commit { crc })?)
+}
+
+impl Report for LvdtReport {
+    fn text(&self) -> String {
+        let mut table = Columns::new(&["length mm", "code", "std", "residual mm"]);
+        for point in &self.points {
+            let cells = [
+                fixed(point.length_mm, 4),
+                fixed(point.code, 1),
+                fixed(f64::from(point.code_std), 2),
+                fixed(point.residual_mm, 4),
+            ];
+            table.row(cells);
+        }
+        let mut text = table.text();
+        text += &format!("degree {}: RMS {:.4} mm, largest {:.4} mm\n", self.degree, self.rms_mm, self.max_abs_mm);
+        text += &format!("codes {} to {}; {}\n", self.code_min, self.code_max, self.outcome);
+        text
+    }
+}

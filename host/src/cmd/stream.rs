@@ -1,0 +1,287 @@
+//! `host-cal stream`: watch a board, and record what it sends.
+
+mod account;
+mod live;
+mod watch;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use ballbar::StillnessCriteria;
+use ballbar::wire::{Command, FrameCounts, StreamSelection};
+use clap::Args;
+use miette::Diagnostic;
+use serde::Serialize;
+use thiserror::Error;
+
+use super::inputs::{OutputArgs, parse_pairings};
+use super::outcome::{CommandError, Outcome};
+use super::port::PortArgs;
+use super::report::{Report, print, warn};
+use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
+use crate::files::Rig;
+use crate::session::{Connection, Recorder, Run};
+use crate::units::{m_from_mm, mm_from_m};
+use account::Account;
+use live::Latest;
+use watch::Watch;
+
+/// Watch a board: joint angles, length, losses; record a session
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  host-cal stream /dev/ttyUSB0\n  host-cal stream /dev/ttyUSB0 --session today --rig rig.toml --pairing A:1 --bar 460\n\nWithout --raw, --settled and --pose, samples and settled poses are streamed. Ctrl-C ends cleanly.\nA session's poses.csv holds one row for every pose at which the arm stood still; it needs --pairing and --bar."
+)]
+pub(super) struct StreamArgs {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Directory to record into; one that holds a session is gone on with
+    #[arg(long, value_name = "DIR")]
+    session: Option<PathBuf>,
+    /// End after this time, as in 30s or 2m
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_time)]
+    time: Option<Duration>,
+    /// End after so many settled poses
+    #[arg(long, value_name = "N")]
+    poses: Option<u64>,
+    /// Stream every sample
+    #[arg(long)]
+    raw: bool,
+    /// Stream the poses at which the arm stood still
+    #[arg(long)]
+    settled: bool,
+    /// Stream the tool's corrected pose
+    #[arg(long)]
+    pose: bool,
+    /// Samples a second, 100 to 5000
+    #[arg(long, default_value_t = 1000, value_name = "HZ")]
+    rate: u16,
+    /// How long the arm must stand still, milliseconds
+    #[arg(long, default_value_t = 500, value_name = "MS")]
+    hold_ms: u32,
+    /// Band of the encoders within which the arm stands still, counts
+    #[arg(long, default_value_t = StillnessCriteria::default().band_counts, value_name = "N")]
+    band_counts: u16,
+    /// Band of the LVDT within which the arm stands still, codes of 65,536
+    #[arg(long, default_value_t = StillnessCriteria::default().band_codes, value_name = "N")]
+    band_codes: u16,
+    /// What the bar joins, chuck:sphere
+    #[arg(long, value_name = "A:1")]
+    pairing: Option<String>,
+    /// Length of the bar at mid travel, millimetres
+    #[arg(long, value_name = "MM")]
+    bar: Option<f64>,
+    /// rig.toml, or the built-in: triangles; checks the pairing and the bar
+    #[arg(long)]
+    rig: Option<String>,
+    /// Temperature, kept with the session, degrees Celsius
+    #[arg(long, value_name = "C")]
+    temperature_c: Option<f64>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+enum StreamError {
+    #[error("--pairing and --bar need each other")]
+    #[diagnostic(help("Poses are written with the chuck, the sphere and the length: --pairing A:1 --bar 460"))]
+    HalfConnection,
+    #[error("--pairing and --bar without --session")]
+    #[diagnostic(help("Poses are written into a session: --session DIR"))]
+    NoSession,
+    #[error("--bar is {found} mm, but the rig's bar has {known} mm")]
+    OtherBar { found: f64, known: String },
+    #[error("--bar is {0}, expected a number of millimetres above 0")]
+    BadBar(f64),
+    #[error("--pairing `{0}`: expected one chuck and one sphere, as in A:1")]
+    BadPairing(String),
+    #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
+    #[diagnostic(help(
+        "Upload a robot first: host-cal apply PORT --robot robot.toml. Raw samples can be streamed without: --raw"
+    ))]
+    NoParameters,
+}
+
+/// What the run ended with.
+#[derive(Serialize)]
+struct StreamReport {
+    port: String,
+    board: String,
+    firmware: String,
+    robot: Option<String>,
+    rate_hz: u16,
+    duration_s: f64,
+    samples: u64,
+    /// By the board's clock; none before two samples came.
+    measured_rate_hz: Option<f64>,
+    settled: u64,
+    tool_poses: u64,
+    poses_written: u64,
+    losses: StreamLosses,
+    frames: FrameLine,
+    gaps: u64,
+    latest: Latest,
+    session: Option<String>,
+}
+
+/// Frames that arrived, by their fate.
+#[derive(Serialize)]
+struct FrameLine {
+    good: u32,
+    crc: u32,
+    malformed: u32,
+    overlong: u32,
+    not_understood: u32,
+}
+
+impl StreamArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        let connection = self.connection()?;
+        let mut link = self.port.connect()?;
+        let robot = RobotOnBoard::read(&mut link)?;
+        if robot.is_none() && (connection.is_some() || self.pose) {
+            return Err(StreamError::NoParameters.into());
+        }
+        let recorder = self.recorder(&link, robot.as_ref(), connection)?;
+        let account = Account::new(robot.map(|(robot, _)| robot), recorder, self.bar);
+        let mut watch = Watch::new(link, self, account);
+        let ended = watch.run();
+        let report = watch.finish()?;
+        print(&report, self.output.json)?;
+        ended?;
+        Ok(if report.losses.missing + report.losses.overruns + report.gaps == 0 { Outcome::Good } else { Outcome::Doubtful })
+    }
+
+    /// What is streamed.
+    fn selection(&self) -> StreamSelection {
+        let nothing_said = !(self.raw || self.settled || self.pose);
+        StreamSelection { samples: self.raw || nothing_said, settled: self.settled || nothing_said, poses: self.pose }
+    }
+
+    /// Tells the board what to do; again after it was away.
+    fn start(&self, link: &mut BoardLink) -> Result<(), crate::board::BoardError> {
+        let hold_us = self.hold_ms.saturating_mul(1_000);
+        let criteria = StillnessCriteria { hold_us, band_counts: self.band_counts, band_codes: self.band_codes };
+        link.act(Command::SetRate { rate_hz: self.rate })?;
+        link.act(Command::SetStillness(criteria))?;
+        link.act(Command::StartStream(self.selection()))
+    }
+
+    fn connection(&self) -> Result<Option<Connection>, CommandError> {
+        let (pairing, bar_mm) = match (&self.pairing, self.bar) {
+            (None, None) => return Ok(None),
+            (Some(pairing), Some(bar_mm)) => (pairing, bar_mm),
+            _ => return Err(StreamError::HalfConnection.into()),
+        };
+        if self.session.is_none() {
+            return Err(StreamError::NoSession.into());
+        }
+        if !(bar_mm > 0.0 && bar_mm <= 1e6) {
+            return Err(StreamError::BadBar(bar_mm).into());
+        }
+        let bad_pairing = || StreamError::BadPairing(pairing.clone());
+        if let Some(rig) = &self.rig {
+            let rig = Rig::open(rig)?;
+            if parse_pairings(pairing, &rig)?.len() != 1 {
+                return Err(bad_pairing().into());
+            }
+            check_bar(bar_mm, &rig)?;
+        }
+        let (chuck, sphere) = pairing.split_once(':').ok_or_else(bad_pairing)?;
+        let is_name = |name: &str| !name.is_empty() && !name.contains([',', ':', '#', '"']);
+        if !is_name(chuck) || !is_name(sphere) {
+            return Err(bad_pairing().into());
+        }
+        Ok(Some(Connection { chuck: chuck.into(), sphere: sphere.into(), bar_m: m_from_mm(bar_mm) }))
+    }
+
+    fn recorder(
+        &self,
+        link: &BoardLink,
+        robot: Option<&(RobotOnBoard, Vec<u8>)>,
+        connection: Option<Connection>,
+    ) -> Result<Option<Recorder>, CommandError> {
+        let Some(session) = &self.session else { return Ok(None) };
+        let run = Run {
+            rig: self.rig.clone(),
+            pairing: self.pairing.clone(),
+            bar_mm: self.bar,
+            temperature_c: self.temperature_c,
+            ..Run::beginning(link.port_name(), link.hello(), self.rate)
+        };
+        let kinds = robot.map_or(&[][..], |(robot, _)| robot.kinds());
+        let connection = connection.map(|connection| (connection, kinds));
+        let mut recorder = Recorder::begin(session, run, connection).map_err(record_error)?;
+        if let Some((_, frame)) = robot {
+            recorder.frame(frame).map_err(record_error)?;
+        }
+        if self.selection().settled && self.pairing.is_none() {
+            warn("without --pairing and --bar the settled poses go to the log and not to poses.csv");
+        }
+        Ok(Some(recorder))
+    }
+}
+
+/// What is there and cannot be read is bad input; what cannot be written is not.
+fn record_error(error: crate::session::RecordError) -> CommandError {
+    use crate::session::{DescriptionError, LogError, PoseFileError, RecordError};
+    match error {
+        RecordError::Log(LogError::NotALog { .. } | LogError::OtherVersion { .. })
+        | RecordError::Description(DescriptionError::Unreadable { .. })
+        | RecordError::Poses(PoseFileError::OtherColumns { .. } | PoseFileError::Unreadable { .. }) => error.into(),
+        error => CommandError::output(error),
+    }
+}
+
+fn check_bar(bar_mm: f64, rig: &Rig) -> Result<(), StreamError> {
+    let Some(bar) = &rig.bar else { return Ok(()) };
+    if bar.lengths_m.iter().any(|&m| (mm_from_m(m) - bar_mm).abs() < 1e-6) {
+        return Ok(());
+    }
+    let known = bar.lengths_m.iter().map(|&m| mm_from_m(m).to_string()).collect::<Vec<_>>().join(" or ");
+    Err(StreamError::OtherBar { found: bar_mm, known })
+}
+
+/// `30s`, `2m`, `1h 30m`.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    let time: jiff::SignedDuration = text.parse().map_err(|_| "expected a time as in 30s or 2m".to_owned())?;
+    Duration::try_from(time).map_err(|_| "expected a time above zero".to_owned())
+}
+
+impl From<(FrameCounts, u32)> for FrameLine {
+    fn from((counts, not_understood): (FrameCounts, u32)) -> Self {
+        let FrameCounts { good, overlong, malformed, crc } = counts;
+        Self { good, crc, malformed, overlong, not_understood }
+    }
+}
+
+impl Report for StreamReport {
+    fn text(&self) -> String {
+        let mut text = format!("{} ({} {})", self.port, self.board, self.firmware);
+        text += &self.robot.as_ref().map_or("\n".into(), |robot| format!(", robot {robot}\n"));
+        text += &format!("{:.1} s: {} samples", self.duration_s, self.samples);
+        text += &self.measured_rate_hz.map_or(String::new(), |hz| format!(" at {hz:.1} Hz"));
+        text += &format!(", {} settled poses, {} tool poses\n", self.settled, self.tool_poses);
+        let losses = &self.losses;
+        text += &match losses.missing + losses.overruns {
+            0 => "nothing lost\n".to_owned(),
+            _ => format!(
+                "LOST: {} messages ({} dropped by the board, {} on the line), {} samples by overrun\n",
+                losses.missing, losses.dropped_by_board, losses.lost_on_line, losses.overruns
+            ),
+        };
+        let frames = &self.frames;
+        if frames.crc + frames.malformed + frames.overlong + frames.not_understood > 0 {
+            text += &format!(
+                "frames: {} whole, {} with a wrong CRC, {} malformed, {} overlong, {} not understood\n",
+                frames.good, frames.crc, frames.malformed, frames.overlong, frames.not_understood
+            );
+        }
+        if self.gaps > 0 {
+            text += &format!("the port was lost {} times\n", self.gaps);
+        }
+        if let Some(session) = &self.session {
+            text += &format!("recorded in {session}, {} poses added to poses.csv\n", self.poses_written);
+        }
+        text
+    }
+}

@@ -1,0 +1,149 @@
+//! What is known of the arm at this moment, and the line that shows it.
+
+use std::io::{IsTerminal, Write, stderr};
+use std::time::{Duration, Instant};
+
+use ballbar::wire::{Status, StreamedPose};
+use ballbar::{JointKind, LvdtReading, Sample, Stillness};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::super::port::joints_text;
+use super::super::table::fixed;
+use crate::board::RobotOnBoard;
+use crate::units::{ScreenUnit, mm_from_m};
+
+/// The latest values, in the units of the screen.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct Latest {
+    /// Time by the board's clock, seconds.
+    pub(super) t_s: Option<f64>,
+    /// Encoder positions.
+    pub(super) counts: Vec<i32>,
+    /// Degrees or millimetres, when the board holds parameters.
+    pub(super) q: Option<Vec<f64>>,
+    /// Code of the LVDT.
+    pub(super) code: Option<u16>,
+    /// From mid travel; none when the bar is off or beyond its travel.
+    pub(super) displacement_mm: Option<f64>,
+    /// Bar and displacement together, when --bar was given.
+    pub(super) length_mm: Option<f64>,
+    /// Travel left inwards and outwards.
+    pub(super) travel_left_mm: Option<[f64; 2]>,
+    /// The tool's origin in the base frame.
+    pub(super) position_mm: Option<[f64; 3]>,
+    /// moving, settling or settled, as far as the board has said.
+    pub(super) stillness: Option<&'static str>,
+}
+
+impl Latest {
+    pub(super) fn take_sample(&mut self, sample: &Sample, robot: Option<&RobotOnBoard>, bar_mm: Option<f64>) {
+        self.t_s = Some(sample.t_us as f64 * 1e-6);
+        self.take_channels(&sample.counts, sample.lvdt, robot, bar_mm);
+    }
+
+    pub(super) fn take_status(&mut self, status: &Status, robot: Option<&RobotOnBoard>, bar_mm: Option<f64>) {
+        let counts: Vec<i32> = status.encoders.iter().map(|encoder| encoder.counts).collect();
+        self.t_s = Some(status.uptime_us as f64 * 1e-6);
+        self.take_channels(&counts, status.lvdt, robot, bar_mm);
+        self.stillness = Some(match status.stillness {
+            Stillness::Moving => "moving",
+            Stillness::Settling => "settling",
+            Stillness::Settled => "settled",
+        });
+    }
+
+    pub(super) fn take_pose(&mut self, pose: &StreamedPose) {
+        self.position_mm = Some(pose.pose.position_m.map(|m| mm_from_m(f64::from(m))));
+    }
+
+    fn take_channels(&mut self, counts: &[i32], lvdt: LvdtReading, robot: Option<&RobotOnBoard>, bar_mm: Option<f64>) {
+        self.counts = counts.to_vec();
+        self.code = (!lvdt.saturated).then_some(lvdt.code);
+        let Some(robot) = robot else { return };
+        let q = robot.q(counts.iter().map(|&counts| f64::from(counts)));
+        let screen = robot.kinds().iter().zip(q.as_array());
+        self.q = Some(screen.map(|(&kind, &q)| ScreenUnit::from(kind).from_si(q)).collect());
+        self.displacement_mm = robot.displacement_m(lvdt).map(mm_from_m);
+        self.length_mm = self.displacement_mm.zip(bar_mm).map(|(displacement, bar)| bar + displacement);
+        let (least, most) = robot.set().lvdt.travel_m::<f64>();
+        self.travel_left_mm = self.displacement_mm.map(|now| [now - mm_from_m(least), mm_from_m(most) - now]);
+    }
+
+    fn text(&self, kinds: &[JointKind]) -> String {
+        let mut parts = Vec::new();
+        match &self.q {
+            Some(q) => {
+                let si: Vec<f64> = kinds.iter().zip(q).map(|(&kind, &q)| ScreenUnit::from(kind).to_si(q)).collect();
+                parts.push(joints_text(kinds, &si));
+            }
+            None if !self.counts.is_empty() => parts.push(format!("counts {:?}", self.counts)),
+            None => {}
+        }
+        parts.push(match (self.length_mm, self.displacement_mm, self.code) {
+            (Some(length), ..) => format!("length {} mm", fixed(length, 3)),
+            (None, Some(displacement), _) => format!("bar {displacement:+.3} mm"),
+            (None, None, Some(code)) if self.q.is_none() => format!("code {code}"),
+            _ => "no bar within its travel".into(),
+        });
+        parts.extend(self.travel_left_mm.map(|[inwards, outwards]| format!("{inwards:.1} | {outwards:.1} mm left")));
+        parts.extend(self.position_mm.map(|[x, y, z]| format!("tool {x:.3} {y:.3} {z:.3} mm")));
+        parts.extend(self.stillness.map(str::to_owned));
+        parts.join("  ")
+    }
+}
+
+/// A line on stderr that is drawn anew on a terminal, and said once a second elsewhere.
+pub(super) struct LiveLine {
+    bar: Option<ProgressBar>,
+    shown: Instant,
+}
+
+const REDRAW: Duration = Duration::from_millis(100);
+const SAY: Duration = Duration::from_secs(1);
+
+impl LiveLine {
+    pub(super) fn new() -> Self {
+        let style = ProgressStyle::with_template("{wide_msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+        let bar = stderr().is_terminal().then(|| ProgressBar::new_spinner().with_style(style));
+        Self { bar, shown: Instant::now() }
+    }
+
+    /// Shows the state, when it is time to.
+    pub(super) fn show(&mut self, head: impl FnOnce() -> String, latest: &Latest, kinds: &[JointKind]) {
+        let every = if self.bar.is_some() { REDRAW } else { SAY };
+        if self.shown.elapsed() < every {
+            return;
+        }
+        self.shown = Instant::now();
+        self.say(&format!("{}  {}", head(), latest.text(kinds)));
+    }
+
+    /// Says something that stays.
+    pub(super) fn note(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| say(text)),
+            None => say(text),
+        }
+    }
+
+    pub(super) fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn say(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => {
+                bar.set_message(text.to_owned());
+                bar.tick();
+            }
+            None => say(text),
+        }
+    }
+}
+
+fn say(text: &str) {
+    let _ = writeln!(stderr(), "{text}");
+}

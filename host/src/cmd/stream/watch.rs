@@ -1,0 +1,180 @@
+//! The loop of `stream`: takes what comes, notices what does not, and gets over a lost port.
+
+use std::time::{Duration, Instant};
+
+use ballbar::wire::{Answer, BoardHello, Command, Refusal};
+
+use super::account::Account;
+use super::live::LiveLine;
+use super::{FrameLine, StreamArgs, StreamReport, record_error};
+use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
+use crate::cmd::outcome::CommandError;
+use crate::cmd::port::EndRequest;
+
+/// One run of `stream`.
+pub(super) struct Watch<'a> {
+    args: &'a StreamArgs,
+    link: Link,
+    account: Account,
+    end: EndRequest,
+    line: LiveLine,
+    began: Instant,
+    /// When the board last said anything.
+    heard: Instant,
+}
+
+/// The board, or what is left of it while it is away.
+enum Link {
+    Up(Box<BoardLink>),
+    Lost { hello: Box<BoardHello>, frames: FrameLine },
+}
+
+/// After this much silence the board is asked how it is.
+const SILENCE: Duration = Duration::from_secs(1);
+/// How often a lost port is tried again.
+const RETRY: Duration = Duration::from_millis(300);
+
+impl<'a> Watch<'a> {
+    pub(super) fn new(link: BoardLink, args: &'a StreamArgs, account: Account) -> Self {
+        let now = Instant::now();
+        let (end, line) = (EndRequest::listen(), LiveLine::new());
+        Self { args, link: Link::Up(Box::new(link)), account, end, line, began: now, heard: now }
+    }
+
+    /// Until the time is over, the poses are there, or the user has had enough.
+    pub(super) fn run(&mut self) -> Result<(), CommandError> {
+        if let Link::Up(link) = &mut self.link {
+            self.args.start(link)?;
+        }
+        while !self.is_done() {
+            let Link::Up(link) = &mut self.link else {
+                self.wait_for_port()?;
+                continue;
+            };
+            let lost = match link.next_frame() {
+                Ok(Some(frame)) => {
+                    self.heard = Instant::now();
+                    if let Some(settled) = self.account.take(&frame)? {
+                        self.line.note(&settled);
+                    }
+                    None
+                }
+                Ok(None) if self.heard.elapsed() >= SILENCE => {
+                    self.heard = Instant::now();
+                    ask(link, &mut self.account)?
+                }
+                Ok(None) => None,
+                Err(PortError::Lost { reason, .. }) => Some(reason),
+                Err(error) => return Err(error.into()),
+            };
+            if let Some(reason) = lost {
+                self.lose(&reason)?;
+            }
+            self.show();
+        }
+        Ok(())
+    }
+
+    /// Ends the stream and the session, and says what came of it.
+    pub(super) fn finish(mut self) -> Result<StreamReport, CommandError> {
+        self.line.clear();
+        if let Link::Up(link) = &mut self.link {
+            // What the board had gathered comes before its answer. A board that is gone by now needs no end.
+            if link.act(Command::StopStream).is_ok() {
+                while let Ok(Some(frame)) = link.next_frame() {
+                    self.account.take(&frame)?;
+                }
+            }
+        }
+        let (hello, frames) = match self.link {
+            Link::Up(link) => (link.hello().clone(), link.frame_counts().into()),
+            Link::Lost { hello, frames } => (*hello, frames),
+        };
+        let account = self.account;
+        let report = StreamReport {
+            port: self.args.port.port.clone(),
+            board: hello.board.as_str().to_owned(),
+            firmware: hello.firmware.as_str().to_owned(),
+            robot: account.robot.as_ref().map(|robot| robot.set().name.as_str().to_owned()),
+            rate_hz: self.args.rate,
+            duration_s: self.began.elapsed().as_secs_f64(),
+            samples: account.samples,
+            measured_rate_hz: account.rate_hz(),
+            settled: account.settled,
+            tool_poses: account.tool_poses,
+            poses_written: account.written,
+            losses: account.tally.losses(),
+            frames,
+            gaps: account.gaps,
+            latest: account.latest,
+            session: self.args.session.as_ref().map(|session| session.display().to_string()),
+        };
+        account.recorder.map_or(Ok(()), |recorder| recorder.end()).map_err(record_error)?;
+        Ok(report)
+    }
+
+    fn is_done(&self) -> bool {
+        self.end.is_made()
+            || self.args.time.is_some_and(|time| self.began.elapsed() >= time)
+            || self.args.poses.is_some_and(|poses| self.account.settled >= poses)
+    }
+
+    fn show(&mut self) {
+        let account = &self.account;
+        let kinds = account.robot.as_ref().map_or(&[][..], RobotOnBoard::kinds);
+        let losses = account.tally.losses();
+        let head = || {
+            let rate = account.rate_hz().map_or(String::new(), |hz| format!("{hz:.0} Hz  "));
+            format!("{rate}settled {}  lost {}", account.settled, losses.missing + losses.overruns)
+        };
+        self.line.show(head, &account.latest, kinds);
+    }
+
+    fn lose(&mut self, reason: &str) -> Result<(), CommandError> {
+        self.line.note(&format!("{}: the board is away: {reason}; waiting for it", self.args.port.port));
+        self.account.lose()?;
+        if let Link::Up(link) = &self.link {
+            let lost = Link::Lost { hello: Box::new(link.hello().clone()), frames: link.frame_counts().into() };
+            // Dropping the old link closes the port, without which it could not be opened again.
+            self.link = lost;
+        }
+        Ok(())
+    }
+
+    /// Tries the port; a board of another version than before is an error, anything else is waited out.
+    fn wait_for_port(&mut self) -> Result<(), CommandError> {
+        match self.regain() {
+            Ok((link, robot)) => {
+                self.line.note(&format!("{}: the board is back", self.args.port.port));
+                self.account.regain(robot)?;
+                self.link = Link::Up(Box::new(link));
+                self.heard = Instant::now();
+            }
+            Err(error @ BoardError::OtherVersion { .. }) => return Err(error.into()),
+            Err(_) => std::thread::sleep(RETRY),
+        }
+        Ok(())
+    }
+
+    fn regain(&self) -> Result<(BoardLink, Option<(RobotOnBoard, Vec<u8>)>), BoardError> {
+        let mut link = BoardLink::connect(&self.args.port.port, self.args.port.baud)?;
+        let robot = RobotOnBoard::read(&mut link)?;
+        self.args.start(&mut link)?;
+        Ok((link, robot))
+    }
+}
+
+/// Asks a silent board how it is; a reason when it has to be greeted anew.
+fn ask(link: &mut BoardLink, account: &mut Account) -> Result<Option<String>, CommandError> {
+    match link.request(Command::Status) {
+        Ok(Answer::Status(status)) => {
+            account.take_status(&status);
+            Ok(status.streaming.is_none().then(|| "it does not stream any more".into()))
+        }
+        Ok(_) => Ok(None),
+        Err(BoardError::Refused { refusal: Refusal::HelloFirst, .. }) => Ok(Some("it was reset".into())),
+        Err(BoardError::Port(PortError::Lost { reason, .. })) => Ok(Some(reason)),
+        Err(BoardError::NoReply { .. }) => Ok(Some("it does not answer".into())),
+        Err(error) => Err(error.into()),
+    }
+}

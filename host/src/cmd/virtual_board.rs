@@ -1,0 +1,269 @@
+//! `host-cal virtual-board`: the firmware with a simulated robot and ball-bar, behind a port.
+
+use std::io::{Write, stderr};
+use std::num::NonZeroU64;
+use std::path::PathBuf;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::inputs::{ListError, OutputArgs, parse_pairings};
+use super::outcome::{CommandError, Outcome};
+use super::port::EndRequest;
+use super::report::{Report, print, progress};
+use crate::board::parameter_set;
+use crate::files::{Rig, Robot};
+use crate::simulate::Shells;
+use crate::units::m_from_mm;
+use crate::virtual_board::{JointSpeed, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
+
+/// Try everything without hardware: the board's own firmware, with a simulated robot and bar, behind a serial port
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-cal virtual-board --ready --pairings A:1 --port /tmp/board
+  host-cal stream /tmp/board --session try --rig triangles --pairing A:1 --bar 460
+
+The first line on stdout is the port's name, or with --json one document that holds it.
+The robot stands still until a host streams, and then goes from pose to pose.
+Runs until Ctrl-C; with --once until the last pose was taken.")]
+pub(super) struct VirtualBoardArgs {
+    /// The robot as it is: robot.toml, or a built-in
+    #[arg(long, default_value = "puma560-optimised")]
+    robot: String,
+    /// The robot as its controller believes it to be: poses are planned with it, and --ready stores it
+    #[arg(long, default_value = "puma560")]
+    design: String,
+    /// rig.toml, or the built-in: triangles
+    #[arg(long, default_value = "triangles")]
+    rig: String,
+    /// Length of the bar at mid travel, millimetres
+    #[arg(long, default_value_t = 460.0, value_name = "MM", allow_hyphen_values = true)]
+    bar: f64,
+    /// Pairings, chuck:sphere separated by commas, one after the other; all when not given
+    #[arg(long, value_name = "A:1,B:2,…")]
+    pairings: Option<String>,
+    /// Poses on each pairing's shell
+    #[arg(long, default_value_t = 90, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    per_pair: u32,
+    /// How long the robot stands at each pose, seconds
+    #[arg(long, default_value_t = 1.0, value_name = "S", allow_hyphen_values = true)]
+    dwell_s: f64,
+    /// The highest speed of the joints, degrees per second
+    #[arg(long, default_value_t = 60.0, value_name = "DEG/S", allow_hyphen_values = true)]
+    speed_deg_s: f64,
+    /// Standard deviation of the lengths' error from pose to pose, millimetres
+    #[arg(long, default_value_t = 0.084, value_name = "MM", allow_hyphen_values = true)]
+    sigma_mm: f64,
+    /// The same seed gives the same poses and noise
+    #[arg(long, default_value_t = 7)]
+    seed: u64,
+    /// How fast time passes for the robot
+    #[arg(long, value_enum, default_value_t = PaceArg::Real)]
+    pace: PaceArg,
+    /// Keep the board's flash in this file
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
+    /// Make this symbolic link to the port
+    #[arg(long, value_name = "PATH")]
+    port: Option<PathBuf>,
+    /// Begin with homed encoders, and with the design's parameters where the flash holds none
+    #[arg(long)]
+    ready: bool,
+    /// Move at once, instead of when a host streams
+    #[arg(long)]
+    at_once: bool,
+    /// End when the last pose was taken and the host has read all
+    #[arg(long)]
+    once: bool,
+    /// Flip one bit in every N bytes to the host
+    #[arg(long, value_name = "N")]
+    bit_errors: Option<NonZeroU64>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PaceArg {
+    /// As the wall clock
+    Real,
+    /// As fast as it can be computed, and as the host reads
+    Free,
+}
+
+impl From<PaceArg> for Pace {
+    fn from(pace: PaceArg) -> Self {
+        match pace {
+            PaceArg::Real => Self::Real,
+            PaceArg::Free => Self::Free,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct VirtualBoardReport {
+    port: String,
+    robot: String,
+    design: String,
+    pairings: Vec<String>,
+    bar_mm: f64,
+    poses: usize,
+    dwell_s: f64,
+    sigma_mm: f64,
+    seed: u64,
+    ready: bool,
+}
+
+/// Travel of the paper's LVDT, for a rig that does not say.
+const NOMINAL_TRAVEL_MM: f64 = 75.0;
+/// Time between two looks at the board.
+const LOOK: Duration = Duration::from_millis(20);
+/// With --once: so long must the host have had nothing to read, and so long is waited for one that does not read.
+const DRAINED_LOOKS: u32 = 5;
+const READER_PATIENCE: Duration = Duration::from_secs(5);
+
+impl VirtualBoardArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        self.check()?;
+        let (truth, design, rig) = (Robot::open(&self.robot)?, Robot::open(&self.design)?, Rig::open(&self.rig)?);
+        let pairings = self.pairings.as_ref().map_or_else(|| Ok(rig.all_pairings()), |list| parse_pairings(list, &rig))?;
+        if truth.chain.joint_kinds() != design.chain.joint_kinds() {
+            return refuse("--design", design.name.clone(), "a robot with the same joints as --robot");
+        }
+        let shells = Shells {
+            planned_with: &design,
+            truth: &truth,
+            rig: &rig,
+            pairings: &pairings,
+            bar_m: m_from_mm(self.bar),
+            per_pairing: self.per_pair as usize,
+            sigma_m: m_from_mm(self.sigma_mm),
+            seed: self.seed,
+        };
+        let speed = JointSpeed { revolute_rad_s: self.speed_deg_s.to_radians(), ..JointSpeed::default() };
+        let bar = progress((pairings.len() * shells.per_pairing) as u64, "planning poses");
+        let script = Script::from_shells(&shells, self.dwell_s, speed, || bar.inc(1))?;
+        bar.finish_and_clear();
+
+        let end = EndRequest::listen();
+        let mut board = self.power_up(&truth, &design, &rig)?;
+        let report = VirtualBoardReport {
+            port: board.port().to_owned(),
+            robot: truth.name.clone(),
+            design: design.name.clone(),
+            pairings: pairings.iter().map(|&pairing| rig.pairing_name(pairing)).collect(),
+            bar_mm: self.bar,
+            poses: script.stations.len(),
+            dwell_s: self.dwell_s,
+            sigma_mm: self.sigma_mm,
+            seed: self.seed,
+            ready: self.ready,
+        };
+        print(&report, self.output.json)?;
+        say(&self.explanation(&report));
+        if self.at_once {
+            board.play(script);
+        } else {
+            board.play_with_stream(script);
+        }
+        self.wait(&board, &end);
+        Ok(Outcome::Good)
+    }
+
+    fn check(&self) -> Result<(), CommandError> {
+        let is_positive = |value: f64| value > 0.0 && value <= 1e6;
+        if !is_positive(self.bar) {
+            return refuse("--bar", self.bar.to_string(), "a number above 0, at most 1e6");
+        }
+        if !is_positive(self.dwell_s) {
+            return refuse("--dwell-s", self.dwell_s.to_string(), "a number above 0, at most 1e6");
+        }
+        if !(1.0..=1e4).contains(&self.speed_deg_s) {
+            return refuse("--speed-deg-s", self.speed_deg_s.to_string(), "a number from 1 to 1e4");
+        }
+        if !(0.0..=1e6).contains(&self.sigma_mm) {
+            return refuse("--sigma-mm", self.sigma_mm.to_string(), "a number from 0 to 1e6");
+        }
+        Ok(())
+    }
+
+    fn power_up(&self, truth: &Robot, design: &Robot, rig: &Rig) -> Result<VirtualBoard, CommandError> {
+        let travel_m = rig.bar.as_ref().map_or(m_from_mm(NOMINAL_TRAVEL_MM), |bar| bar.travel_m);
+        let plant = Plant::new(truth, travel_m, self.seed)?;
+        let parameters = if self.ready { Some(parameter_set(design, plant.lvdt())?) } else { None };
+        let options = VirtualBoardOptions {
+            parameters,
+            is_homed: self.ready,
+            flash_file: self.flash.clone(),
+            port_name: self.port.clone(),
+            bit_errors: self.bit_errors,
+            ..VirtualBoardOptions::new(plant, self.pace.into())
+        };
+        Ok(VirtualBoard::start(options)?)
+    }
+
+    fn explanation(&self, report: &VirtualBoardReport) -> String {
+        let state = if self.ready {
+            "Its encoders are homed; unless its flash held parameters, it has the design's."
+        } else {
+            "It holds no parameters unless its flash does, and its encoders are not homed."
+        };
+        let begin = if self.at_once { "The robot moves." } else { "The robot moves when a host streams." };
+        format!(
+            "A board with a simulated {}, planned as {}: {} poses on {} of {} mm, {} s at each. {begin}\n{state}\n\
+             Try: host-cal stream {}\nCtrl-C ends it.\n",
+            report.robot,
+            report.design,
+            report.poses,
+            if report.pairings.len() == 1 {
+                format!("the shell {}", report.pairings[0])
+            } else {
+                format!("{} shells", report.pairings.len())
+            },
+            report.bar_mm,
+            report.dwell_s,
+            report.port
+        )
+    }
+
+    /// Until the user ends it; with `--once` until nothing is left to do.
+    fn wait(&self, board: &VirtualBoard, end: &EndRequest) {
+        let began = Instant::now();
+        let mut done_at = None;
+        let mut drained = 0;
+        while !end.is_made() {
+            sleep(LOOK);
+            if !self.once || !board.is_done() {
+                continue;
+            }
+            drained = if board.is_drained() { drained + 1 } else { 0 };
+            let done_at = *done_at.get_or_insert_with(Instant::now);
+            if drained >= DRAINED_LOOKS || done_at.elapsed() > READER_PATIENCE {
+                break;
+            }
+        }
+        let flips = board.bit_flips();
+        let damage = if self.bit_errors.is_some() { format!(", {flips} bits flipped") } else { String::new() };
+        say(&format!(
+            "Ended after {:.1} s of the robot's time in {:.1} s{damage}.\n",
+            board.robot_time().as_secs_f64(),
+            began.elapsed().as_secs_f64()
+        ));
+    }
+}
+
+impl Report for VirtualBoardReport {
+    fn text(&self) -> String {
+        format!("{}\n", self.port)
+    }
+}
+
+fn refuse<T>(flag: &'static str, found: String, expected: &'static str) -> Result<T, CommandError> {
+    Err(ListError::Number { flag, found, expected }.into())
+}
+
+/// To people, on stderr; without a stderr nobody is there to be told.
+fn say(text: &str) {
+    let _ = stderr().write_all(text.as_bytes());
+}

@@ -1,0 +1,147 @@
+//! `session.toml`: what was recorded with what.
+
+use std::path::{Path, PathBuf};
+
+use ballbar::wire::{BoardHello, SetIdentity};
+use miette::Diagnostic;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::files::{WriteError, write_atomically};
+
+/// A session's description; one run for every time that a program recorded into it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Description {
+    /// The runs, in order.
+    #[serde(default)]
+    pub runs: Vec<Run>,
+}
+
+/// One recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// When it began, RFC 3339.
+    pub started: String,
+    /// When it ended; missing when the program was killed.
+    pub ended: Option<String>,
+    /// The program and its version.
+    pub by: String,
+    /// The port.
+    pub port: String,
+    /// The rig's file or built-in.
+    pub rig: Option<String>,
+    /// `chuck:sphere` that the bar joined.
+    pub pairing: Option<String>,
+    /// The bar's length at mid travel, millimetres.
+    pub bar_mm: Option<f64>,
+    /// Temperature, where somebody gave it, degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// Sampling rate, Hz.
+    pub rate_hz: u16,
+    /// Settled poses written to poses.csv in this run.
+    pub poses: usize,
+    /// The board.
+    pub board: BoardDescription,
+    /// The robot whose parameters the board used.
+    pub robot: Option<RobotDescription>,
+}
+
+/// A board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoardDescription {
+    /// Its kind.
+    pub kind: String,
+    /// Its number.
+    pub unique_id: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// Number of the protocol.
+    pub protocol: u16,
+    /// From the first to the last encoder of a latch, at most, nanoseconds.
+    pub encoder_skew_ns: u32,
+    /// From the encoders' latch to the middle of the LVDT's scan, nanoseconds.
+    pub lvdt_delay_ns: u32,
+}
+
+/// Parameters of a board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotDescription {
+    /// The robot's name.
+    pub name: String,
+    /// Whether a fit made the parameters.
+    pub is_calibrated: bool,
+    /// CRC-32 of the set.
+    pub crc: String,
+}
+
+/// Why a session's description cannot be read or written.
+#[derive(Debug, Error, Diagnostic)]
+pub enum DescriptionError {
+    /// It cannot be read.
+    #[error("{}: {reason}", path.display())]
+    #[diagnostic(help("A session's session.toml is written by `host-cal stream`. Give another directory, or mend the file."))]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+    /// It cannot be written.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Write(#[from] WriteError),
+}
+
+impl Description {
+    /// Reads the description in a session's directory; an empty one when there is none yet.
+    ///
+    /// # Errors
+    /// [`DescriptionError::Unreadable`].
+    pub fn read(session: &Path) -> Result<Self, DescriptionError> {
+        let path = session.join(super::DESCRIPTION_NAME);
+        let unreadable = |reason: String| DescriptionError::Unreadable { path: path.clone(), reason };
+        match std::fs::read_to_string(&path) {
+            Ok(text) => toml::from_str(&text).map_err(|error| unreadable(error.message().replace('\n', ", "))),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
+            Err(error) => Err(unreadable(error.to_string())),
+        }
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// [`DescriptionError::Write`].
+    pub fn write(&self, session: &Path) -> Result<(), DescriptionError> {
+        let path = session.join(super::DESCRIPTION_NAME);
+        let text = toml::to_string(self)
+            .map_err(|error| DescriptionError::Unreadable { path: path.clone(), reason: error.to_string() })?;
+        Ok(write_atomically(&path, &text)?)
+    }
+}
+
+impl From<&BoardHello> for BoardDescription {
+    fn from(hello: &BoardHello) -> Self {
+        Self {
+            kind: hello.board.as_str().to_owned(),
+            unique_id: hello.unique_id.iter().map(|byte| format!("{byte:02x}")).collect(),
+            firmware: hello.firmware.as_str().to_owned(),
+            protocol: hello.version.number,
+            encoder_skew_ns: hello.encoder_skew_ns,
+            lvdt_delay_ns: hello.lvdt_delay_ns,
+        }
+    }
+}
+
+impl From<&SetIdentity> for RobotDescription {
+    fn from(identity: &SetIdentity) -> Self {
+        Self {
+            name: identity.name.as_str().to_owned(),
+            is_calibrated: identity.is_calibrated,
+            crc: format!("{:08x}", identity.crc),
+        }
+    }
+}

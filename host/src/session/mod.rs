@@ -1,0 +1,26 @@
+//! A session: a directory that says what was recorded with what, and holds what the board sent and the poses that settled.
+//!
+//! | file | |
+//! | --- | --- |
+//! | `session.toml` | robot, rig, bar, board, versions and times of every run; written by rename |
+//! | `stream.bbl` | the frames exactly as they came and were found whole; append-only |
+//! | `poses.csv` | the settled poses as [`crate::files`] reads them; written by rename |
+
+mod description;
+mod export;
+mod log;
+mod pose_file;
+mod recorder;
+
+pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
+pub use export::{ExportError, export_csv};
+pub use log::{LogError, LogReader, LogSummary, LogWriter, Record};
+pub use pose_file::{PoseFile, PoseFileError, SettledRow};
+pub use recorder::{Connection, RecordError, Recorder};
+
+/// Name of the log in a session.
+pub const LOG_NAME: &str = "stream.bbl";
+/// Name of the description in a session.
+pub const DESCRIPTION_NAME: &str = "session.toml";
+/// Name of the poses in a session.
+pub const POSES_NAME: &str = "poses.csv";

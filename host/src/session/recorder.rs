@@ -1,0 +1,162 @@
+//! Takes what a board streams into a session's files.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use ballbar::wire::{BoardHello, LogMark};
+use ballbar::{JointKind, JointVector};
+use miette::Diagnostic;
+use thiserror::Error;
+
+use super::description::{Description, DescriptionError, Run};
+use super::log::{LogError, LogWriter, unix_ms};
+use super::pose_file::{PoseFile, PoseFileError, SettledRow};
+use super::{LOG_NAME, POSES_NAME};
+
+/// Why a recording cannot begin or go on.
+#[derive(Debug, Error, Diagnostic)]
+pub enum RecordError {
+    /// The directory.
+    #[error("{}: cannot be made: {error}", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// The operating system's reason.
+        error: std::io::Error,
+    },
+    /// The log.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Log(#[from] LogError),
+    /// The description.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Description(#[from] DescriptionError),
+    /// The poses.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Poses(#[from] PoseFileError),
+}
+
+/// Which ends the bar joined, and how long it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Connection {
+    /// Name of the chuck.
+    pub chuck: String,
+    /// Name of the sphere.
+    pub sphere: String,
+    /// Length of the bar at mid travel, metres.
+    pub bar_m: f64,
+}
+
+/// A session being recorded.
+pub struct Recorder {
+    session: PathBuf,
+    log: LogWriter,
+    poses: Option<(PoseFile, Connection)>,
+    description: Description,
+    synced: Instant,
+}
+
+/// How often the disk is asked to keep what was written.
+const SYNC_EVERY: Duration = Duration::from_secs(1);
+
+impl Recorder {
+    /// Begins a run in a session's directory, which is made when it is not there. With a connection and the kinds of the joints,
+    /// settled poses go to poses.csv.
+    ///
+    /// # Errors
+    /// [`RecordError`]; nothing that was in the directory is changed then.
+    pub fn begin(session: &Path, run: Run, connection: Option<(Connection, &[JointKind])>) -> Result<Self, RecordError> {
+        std::fs::create_dir_all(session).map_err(|error| RecordError::Directory { path: session.to_owned(), error })?;
+        let mut description = Description::read(session)?;
+        let poses = match connection {
+            Some((connection, kinds)) => Some((PoseFile::open(&session.join(POSES_NAME), kinds)?, connection)),
+            None => None,
+        };
+        let log = LogWriter::open(&session.join(LOG_NAME))?;
+        description.runs.push(run);
+        description.write(session)?;
+        Ok(Self { session: session.to_owned(), log, poses, description, synced: Instant::now() })
+    }
+
+    /// Keeps a frame.
+    ///
+    /// # Errors
+    /// [`RecordError::Log`].
+    pub fn frame(&mut self, bytes: &[u8]) -> Result<(), RecordError> {
+        self.log.frame(bytes)?;
+        if self.synced.elapsed() >= SYNC_EVERY {
+            self.log.sync()?;
+            self.synced = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// Keeps a settled pose; does nothing when no connection was named.
+    ///
+    /// # Errors
+    /// [`RecordError::Poses`].
+    pub fn pose(&mut self, q: JointVector<f64>, displacement_m: f64, t_s: f64) -> Result<(), RecordError> {
+        if let Some((file, Connection { chuck, sphere, bar_m })) = &mut self.poses {
+            file.add(&SettledRow { chuck, sphere, q, length_m: *bar_m + displacement_m, t_s })?;
+        }
+        Ok(())
+    }
+
+    /// Notes that the port was lost.
+    ///
+    /// # Errors
+    /// [`RecordError::Log`].
+    pub fn lost(&mut self) -> Result<(), RecordError> {
+        Ok(self.log.mark(LogMark::Lost { unix_ms: unix_ms() })?)
+    }
+
+    /// Notes that the port is back.
+    ///
+    /// # Errors
+    /// [`RecordError::Log`].
+    pub fn back(&mut self) -> Result<(), RecordError> {
+        Ok(self.log.mark(LogMark::Back { unix_ms: unix_ms() })?)
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    /// [`RecordError`].
+    pub fn end(mut self) -> Result<(), RecordError> {
+        self.log.sync()?;
+        let added = self.poses.as_ref().map_or(0, |(file, _)| file.added());
+        if let Some(run) = self.description.runs.last_mut() {
+            run.ended = Some(now());
+            run.poses = added;
+        }
+        Ok(self.description.write(&self.session)?)
+    }
+}
+
+impl Run {
+    /// A run that begins now.
+    pub fn beginning(port: &str, hello: &BoardHello, rate_hz: u16) -> Self {
+        Self {
+            started: now(),
+            ended: None,
+            by: concat!("host-cal ", env!("CARGO_PKG_VERSION")).to_owned(),
+            port: port.to_owned(),
+            rig: None,
+            pairing: None,
+            bar_mm: None,
+            temperature_c: None,
+            rate_hz,
+            poses: 0,
+            board: hello.into(),
+            robot: hello.active.as_ref().map(Into::into),
+        }
+    }
+}
+
+/// RFC 3339, to the second.
+fn now() -> String {
+    let now = jiff::Timestamp::now();
+    now.round(jiff::Unit::Second).unwrap_or(now).to_string()
+}

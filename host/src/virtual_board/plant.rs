@@ -1,0 +1,392 @@
+//! A simulated robot with the ball-bar at its tool, as a function of time: what a board's inputs see.
+//!
+//! The robot goes from station to station of a [`Script`]. At a station its servos hold whole counts, after a short ringing; the
+//! length is that of the true chain at these encoder outputs plus the station's error, and the LVDT shows it with a little noise.
+//! Nothing here knows of a board, so that boards of any kind can be fed with it.
+
+use std::collections::VecDeque;
+
+use ballbar::{CounterWidth, JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve};
+use ballbar_firmware::{ENCODERS, EncoderLatch, LvdtScan};
+use miette::Diagnostic;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use thiserror::Error;
+
+use super::lvdt::{code_at, lvdt_curve};
+use super::motion::{Held, Move, Rest, us_from_s};
+use super::script::{JointSpeed, Script, Station};
+use crate::files::{NoEncoders, Robot};
+
+/// Widths of the counters: a PUMA's joints 4 and 6 span more than 16 bits and have the 32-bit ones, as on the real board.
+pub const COUNTER_WIDTHS: [CounterWidth; ENCODERS] = {
+    let mut widths = [CounterWidth::Bits16; ENCODERS];
+    widths[3] = CounterWidth::Bits32;
+    widths[5] = CounterWidth::Bits32;
+    widths
+};
+
+/// Noise of the LVDT's oversampled code, standard deviation, codes.
+const CODE_NOISE: f64 = 1.5;
+
+/// A simulated robot and ball-bar. The same seed and the same calls give the same states.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    truth: Kinematics<f64>,
+    kinds: Vec<JointKind>,
+    encoders: JointEncoders<f64>,
+    lvdt: LvdtCurve,
+    /// Counts at power-up, where the counters stand at zero.
+    start_counts: [i32; ENCODERS],
+    /// Counts at the call before.
+    last_counts: [i32; ENCODERS],
+    phase: Phase,
+    waiting: VecDeque<Station>,
+    speed: JointSpeed,
+    now_us: u64,
+    rng: ChaCha8Rng,
+}
+
+/// What the board's inputs see at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PlantState {
+    /// The counters and the index pulses since the call before.
+    pub latch: EncoderLatch,
+    /// The LVDT.
+    pub scan: LvdtScan,
+}
+
+/// Why a robot cannot be simulated.
+#[derive(Debug, Error, Diagnostic)]
+pub enum PlantError {
+    /// Its file does not say how its encoders count.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    NoEncoders(#[from] NoEncoders),
+    /// More joints than the board has encoders.
+    #[error("the robot has {joints} joints, but the board counts {ENCODERS} encoders")]
+    #[diagnostic(help("Take a robot of at most {ENCODERS} joints."))]
+    TooManyJoints {
+        /// Joints of the robot.
+        joints: usize,
+    },
+}
+
+#[derive(Clone, Debug)]
+enum Phase {
+    Rest(Box<Rest>),
+    Move(Box<Move>),
+}
+
+impl Plant {
+    /// The robot at rest at encoder outputs of zero, or as near to them as its limits allow, with the bar not attached.
+    /// `travel_m` is the LVDT's from end to end.
+    ///
+    /// # Errors
+    /// [`PlantError`] for a robot whose encoders are not known or are more than a board's.
+    pub fn new(truth: &Robot, travel_m: f64, seed: u64) -> Result<Self, PlantError> {
+        let joints = truth.chain.joints();
+        if joints > ENCODERS {
+            return Err(PlantError::TooManyJoints { joints });
+        }
+        let encoders = truth.joint_encoders()?;
+        let mut q = JointVector::zero();
+        for (q, limits) in q.as_array_mut().iter_mut().zip(&truth.limits) {
+            *q = 0_f64.clamp(limits.min, limits.max);
+        }
+        let rest = Rest::at_start(Held::new(&encoders, &q));
+        let (start_counts, _) = rest.at(0);
+        Ok(Self {
+            truth: Kinematics::new(&truth.chain),
+            kinds: truth.chain.joint_kinds().to_vec(),
+            encoders,
+            lvdt: lvdt_curve(travel_m),
+            start_counts,
+            last_counts: start_counts,
+            phase: Phase::Rest(Box::new(rest)),
+            waiting: VecDeque::new(),
+            speed: JointSpeed::default(),
+            now_us: 0,
+            rng: ChaCha8Rng::seed_from_u64(seed),
+        })
+    }
+
+    /// The true curve of the LVDT.
+    pub fn lvdt(&self) -> LvdtCurve {
+        self.lvdt
+    }
+
+    /// Joints of the robot; the encoders beyond them stand at zero.
+    pub fn joints(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// True positions of the encoders at the latest call of [`Plant::at`], counts from encoder output zero: what a homed board
+    /// shows.
+    pub fn counts(&self) -> [i32; ENCODERS] {
+        self.last_counts
+    }
+
+    /// Stations begin at the next call of [`Plant::at`], instead of what is left of an earlier script. A move under way is
+    /// finished first, a stay at a station is not.
+    pub fn play(&mut self, script: Script) {
+        self.waiting = script.stations.into();
+        self.speed = script.speed;
+        match &mut self.phase {
+            Phase::Rest(rest) => rest.until_us = self.now_us,
+            Phase::Move(movement) => movement.to.dwell_s = 0.0,
+        }
+    }
+
+    /// Whether the last station's time was over at the latest call of [`Plant::at`]. The robot then stays there.
+    pub fn is_done(&self) -> bool {
+        self.waiting.is_empty() && matches!(&self.phase, Phase::Rest(rest) if rest.until_us <= self.now_us)
+    }
+
+    /// The inputs at a time in microseconds, which must not fall from call to call.
+    pub fn at(&mut self, t_us: u64) -> PlantState {
+        self.now_us = t_us;
+        self.go_on();
+        let (counts, displacement_m) = match &self.phase {
+            Phase::Rest(rest) => rest.at(t_us),
+            Phase::Move(movement) => movement.at(t_us, &self.truth),
+        };
+        PlantState { latch: self.latch(counts), scan: self.scan(displacement_m) }
+    }
+
+    /// Ends the phases that are over.
+    fn go_on(&mut self) {
+        loop {
+            self.phase = match &self.phase {
+                Phase::Rest(rest) if rest.until_us <= self.now_us => {
+                    let Some(station) = self.waiting.pop_front() else { return };
+                    let duration_us = us_from_s(self.speed.duration_s(&self.kinds, &rest.held.q, &station.q));
+                    Phase::Move(Box::new(Move::new(**rest, station, &self.encoders, duration_us)))
+                }
+                Phase::Move(movement) if movement.until_us <= self.now_us => {
+                    Phase::Rest(Box::new(movement.arrive(&self.truth, &mut self.rng)))
+                }
+                _ => return,
+            };
+        }
+    }
+
+    fn latch(&mut self, counts: [i32; ENCODERS]) -> EncoderLatch {
+        let mut latch = EncoderLatch::default();
+        for (i, &now) in counts.iter().enumerate() {
+            latch.counters[i] = counter(i, now, self.start_counts[i]);
+            let per_index = self.encoders.encoders().get(i).map_or(0, |encoder| encoder.counts_per_index);
+            latch.at_index[i] =
+                last_index(self.last_counts[i], now, per_index).map(|index| counter(i, index, self.start_counts[i]));
+        }
+        self.last_counts = counts;
+        latch
+    }
+
+    /// Without a bar, or beyond its travel, the signal stands at an end of the converter's range.
+    fn scan(&mut self, displacement_m: Option<f64>) -> LvdtScan {
+        let Some(displacement_m) = displacement_m else { return LvdtScan { code: 0, saturated: true } };
+        let Some(code) = code_at(&self.lvdt, displacement_m) else {
+            return LvdtScan { code: if displacement_m < 0.0 { 0 } else { u16::MAX }, saturated: true };
+        };
+        let noise: f64 = StandardNormal.sample(&mut self.rng);
+        LvdtScan { code: (code + CODE_NOISE * noise).round() as u16, saturated: false }
+    }
+}
+
+/// The hardware counter of encoder `i` at a position in counts.
+fn counter(i: usize, counts: i32, start_counts: i32) -> u32 {
+    let since_start = counts.wrapping_sub(start_counts) as u32;
+    match COUNTER_WIDTHS[i] {
+        CounterWidth::Bits16 => since_start & 0xffff,
+        CounterWidth::Bits32 => since_start,
+    }
+}
+
+/// The last index that was crossed between two positions; indices stand at the whole multiples of `per_index`.
+fn last_index(before: i32, now: i32, per_index: u32) -> Option<i32> {
+    let per_index = i32::try_from(per_index).ok().filter(|&per_index| per_index > 0)?;
+    let (turn_before, turn) = (before.div_euclid(per_index), now.div_euclid(per_index));
+    match turn.cmp(&turn_before) {
+        std::cmp::Ordering::Equal => None,
+        std::cmp::Ordering::Greater => Some(turn.wrapping_mul(per_index)),
+        std::cmp::Ordering::Less => Some((turn + 1).wrapping_mul(per_index)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ballbar::{ExtendedCounter, Pairing, Vector3};
+
+    use super::*;
+    use crate::files::Rig;
+    use crate::simulate::Shells;
+
+    const TRAVEL_M: f64 = 0.075;
+
+    fn puma() -> Robot {
+        Robot::open("puma560-optimised").unwrap()
+    }
+
+    fn plant() -> Plant {
+        Plant::new(&puma(), TRAVEL_M, 1).unwrap()
+    }
+
+    /// Three poses of one pairing on a shell, and one of another pairing.
+    fn script(dwell_s: f64, revolute_deg_s: f64) -> Script {
+        let (robot, rig) = (puma(), Rig::open("triangles").unwrap());
+        let pairings = rig.all_pairings();
+        let stations = [(0, 3), (4, 1)].map(|(pairing, per_pairing)| {
+            let shells = Shells {
+                planned_with: &robot,
+                truth: &robot,
+                rig: &rig,
+                pairings: &pairings[pairing..=pairing],
+                bar_m: 0.46,
+                per_pairing,
+                sigma_m: 1e-4,
+                seed: 3,
+            };
+            Script::from_shells(&shells, dwell_s, JointSpeed::default(), || ()).unwrap().stations
+        });
+        let speed = JointSpeed { revolute_rad_s: revolute_deg_s.to_radians(), ..JointSpeed::default() };
+        Script { stations: stations.concat(), speed }
+    }
+
+    /// States every millisecond until the script is over.
+    fn states(mut plant: Plant, script: Script) -> Vec<(PlantState, [i32; ENCODERS], bool)> {
+        plant.play(script);
+        let mut states = Vec::new();
+        for t_ms in 0.. {
+            let state = plant.at(t_ms * 1_000);
+            states.push((state, plant.counts(), matches!(plant.phase, Phase::Rest(_))));
+            if plant.is_done() {
+                break;
+            }
+        }
+        states
+    }
+
+    #[test]
+    fn a_robot_at_rest_shows_the_station_and_the_true_length() {
+        let (robot, script) = (puma(), script(1.0, 60.0));
+        let (encoders, truth) = (robot.joint_encoders().unwrap(), Kinematics::new(&robot.chain));
+        let mut plant = plant();
+        let mut t_us = 0;
+        for station in &script.stations {
+            plant.play(Script { stations: vec![*station], speed: script.speed });
+            while !plant.is_done() {
+                t_us += 1_000;
+                plant.at(t_us);
+            }
+            let expected = encoders.counts(&station.q);
+            for (found, expected) in plant.counts().iter().zip(expected) {
+                assert!((f64::from(*found) - expected).abs() <= 0.5, "{found} for {expected}");
+            }
+            let codes = 400;
+            let mean = (0..codes).map(|i| f64::from(plant.at(t_us + i).scan.code)).sum::<f64>() / codes as f64;
+            let length_m = 0.46 + plant.lvdt().displacement_of_code_m::<f64>(mean).unwrap();
+            let q = encoders.q(plant.counts().iter().map(|&counts| f64::from(counts)));
+            let expected_m = truth.length(&q, &station.pairing) + station.length_error_m;
+            assert!((length_m - expected_m).abs() < 0.5e-6, "{length_m} for {expected_m}");
+        }
+    }
+
+    #[test]
+    fn counters_start_at_zero_and_extended_follow_the_robot_over_many_wraps() {
+        let start = plant().counts();
+        let states = states(plant(), script(0.2, 400.0));
+        let mut wraps = 0;
+        for i in 0..ENCODERS {
+            let mut counter = ExtendedCounter::new(COUNTER_WIDTHS[i], 0);
+            assert_eq!(states[0].0.latch.counters[i], 0);
+            let mut before = 0;
+            for (state, counts, _) in &states {
+                let now = state.latch.counters[i];
+                assert_eq!(counter.update(now), counts[i] - start[i]);
+                let is_narrow = COUNTER_WIDTHS[i] == CounterWidth::Bits16;
+                wraps += u32::from(is_narrow && now.abs_diff(before) > 40_000);
+                assert!(!is_narrow || now < 65_536);
+                before = now;
+            }
+        }
+        assert!(wraps >= 4, "{wraps}");
+    }
+
+    #[test]
+    fn index_pulses_come_whole_turns_apart_and_as_often_as_turns_were_passed() {
+        let robot = puma();
+        let encoders = robot.joint_encoders().unwrap();
+        let states = states(plant(), script(0.2, 60.0));
+        for (i, encoder) in encoders.encoders().iter().enumerate() {
+            let mut counter = ExtendedCounter::new(COUNTER_WIDTHS[i], 0);
+            let mut first = None;
+            let mut pulses = 0;
+            for (state, ..) in &states {
+                counter.update(state.latch.counters[i]);
+                let Some(at) = state.latch.at_index[i].map(|at| counter.position_at(at)) else { continue };
+                let apart = at - *first.get_or_insert(at);
+                assert_eq!(apart.unsigned_abs() % encoder.counts_per_index, 0);
+                pulses += 1;
+            }
+            let way: u32 = states.windows(2).map(|pair| pair[0].1[i].abs_diff(pair[1].1[i])).sum();
+            assert!(way / encoder.counts_per_index <= pulses + 8, "{way} counts, {pulses} pulses");
+        }
+    }
+
+    #[test]
+    fn the_arm_rings_after_a_move_and_then_stands() {
+        let states = states(plant(), script(1.0, 60.0));
+        let arrived = states.iter().rposition(|(.., is_rest)| !is_rest).unwrap() + 1;
+        let spread = |range: std::ops::Range<usize>| {
+            let codes = states[range].iter().map(|(state, ..)| i32::from(state.scan.code));
+            codes.clone().max().unwrap() - codes.min().unwrap()
+        };
+        assert!(spread(arrived..arrived + 80) > 64);
+        assert!(spread(arrived + 500..arrived + 999) < 16);
+        assert!(states[arrived + 500..].windows(2).all(|pair| pair[0].1 == pair[1].1));
+    }
+
+    #[test]
+    fn the_bar_is_off_until_it_is_first_attached_and_between_pairings() {
+        let states = states(plant(), script(0.3, 60.0));
+        let is_off = |state: &PlantState| state.scan.saturated && (state.scan.code == 0 || state.scan.code == u16::MAX);
+        let first_rest = states.iter().skip(1).position(|(.., is_rest)| *is_rest).unwrap() + 1;
+        assert!(states[1..first_rest].iter().all(|(state, ..)| is_off(state)));
+        assert!(states.iter().skip(first_rest).filter(|(.., is_rest)| *is_rest).all(|(state, ..)| !state.scan.saturated));
+        let last_move = states.iter().rposition(|(.., is_rest)| !is_rest).unwrap();
+        assert!(is_off(&states[last_move].0));
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_states() {
+        let run = |seed| states(Plant::new(&puma(), TRAVEL_M, seed).unwrap(), script(0.2, 200.0));
+        assert_eq!(run(5), run(5));
+        assert_ne!(run(5), run(6));
+    }
+
+    #[test]
+    fn a_script_takes_the_place_of_the_one_before() {
+        let mut plant = plant();
+        let q = JointVector::zero();
+        let pairing = Pairing { chuck_base_m: Vector3::zeros(), sphere_tool_m: Vector3::zeros() };
+        let station = Station { q, pairing, bar_m: 1.0, dwell_s: 100.0, length_error_m: 0.0 };
+        let script = |dwell_s| Script { stations: vec![Station { dwell_s, ..station }], speed: JointSpeed::default() };
+        assert!(plant.is_done());
+        plant.play(script(100.0));
+        assert!(!plant.is_done());
+        plant.at(1_000_000);
+        plant.play(script(1.0));
+        plant.at(2_000_000);
+        assert!(!plant.is_done());
+        plant.at(2_100_000);
+        assert!(plant.is_done());
+    }
+
+    #[test]
+    fn robots_that_no_board_can_count_are_refused() {
+        let error = Plant::new(&Robot::open("ur5e").unwrap(), TRAVEL_M, 0).unwrap_err();
+        assert!(matches!(error, PlantError::NoEncoders(_)));
+    }
+}

@@ -1,0 +1,92 @@
+//! What the simulated robot does: stations at which it stands and measures, and how fast it goes from one to the next.
+
+use ballbar::{JointKind, JointVector, Kinematics, Pairing};
+
+use crate::simulate::{ShellError, Shells};
+
+/// A pose to stand at with the bar attached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Station {
+    /// Encoder outputs, radians or metres. The servos hold the nearest whole counts.
+    pub q: JointVector<f64>,
+    /// The bar's two ends.
+    pub pairing: Pairing<f64>,
+    /// Length of the bar at mid travel, metres.
+    pub bar_m: f64,
+    /// How long the robot stands there, seconds.
+    pub dwell_s: f64,
+    /// What the bar measures too much here, metres: play of the chucks and all else that a fit sees as noise.
+    pub length_error_m: f64,
+}
+
+/// Stations in their order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Script {
+    /// The stations.
+    pub stations: Vec<Station>,
+    /// How fast the robot moves between them.
+    pub speed: JointSpeed,
+}
+
+/// The highest speed that any joint reaches on a move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointSpeed {
+    /// Of revolute joints, radians per second.
+    pub revolute_rad_s: f64,
+    /// Of prismatic joints, metres per second.
+    pub prismatic_m_s: f64,
+}
+
+/// No move is shorter, so that a jump of a few counts is no jolt.
+const SHORTEST_MOVE_S: f64 = 0.05;
+/// Highest speed over mean speed of the profile of [`progress`].
+const PEAK_OVER_MEAN: f64 = 1.875;
+
+impl Default for JointSpeed {
+    /// 60 degrees and 0.25 m per second.
+    fn default() -> Self {
+        Self { revolute_rad_s: 60_f64.to_radians(), prismatic_m_s: 0.25 }
+    }
+}
+
+impl JointSpeed {
+    /// Time from one joint vector to another, seconds: that of the joint that needs longest.
+    pub(super) fn duration_s(&self, kinds: &[JointKind], from: &JointVector<f64>, to: &JointVector<f64>) -> f64 {
+        let alone_s = |((kind, from), to): ((&JointKind, &f64), &f64)| {
+            let speed = match kind {
+                JointKind::Revolute => self.revolute_rad_s,
+                JointKind::Prismatic => self.prismatic_m_s,
+            };
+            (to - from).abs() * PEAK_OVER_MEAN / speed
+        };
+        kinds.iter().zip(from.as_array()).zip(to.as_array()).map(alone_s).fold(SHORTEST_MOVE_S, f64::max)
+    }
+}
+
+/// Share of the way, 0 to 1, at a share of the time: `10 τ³ − 15 τ⁴ + 6 τ⁵`, which begins and ends without a jerk.
+pub(super) fn progress(time_share: f64) -> f64 {
+    let t = time_share.clamp(0.0, 1.0);
+    t * t * t * (10.0 + t * (6.0 * t - 15.0))
+}
+
+impl Script {
+    /// Stations at the poses of simulated shells, `dwell_s` seconds at each; the shells' noise is the stations' length error.
+    /// `on_pose` is called for each.
+    ///
+    /// # Errors
+    /// [`ShellError`] when a shell has too few points that the robot reaches.
+    pub fn from_shells(shells: &Shells<'_>, dwell_s: f64, speed: JointSpeed, on_pose: impl FnMut()) -> Result<Self, ShellError> {
+        let truth = Kinematics::new(&shells.truth.chain);
+        let stations = shells.simulate(on_pose)?.into_iter().map(|pose| {
+            let measurement = pose.row.measurement;
+            Station {
+                q: measurement.q,
+                pairing: measurement.pairing,
+                bar_m: shells.bar_m,
+                dwell_s,
+                length_error_m: measurement.length_m - truth.length(&measurement.q, &measurement.pairing),
+            }
+        });
+        Ok(Self { stations: stations.collect(), speed })
+    }
+}
