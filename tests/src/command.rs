@@ -34,15 +34,16 @@ impl Run {
     }
 }
 
+/// `host-cal` in a folder, to be started.
+pub fn host_cal_command(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(&*HOST_CAL);
+    command.args(args).current_dir(folder).env("NO_COLOR", "1").env_remove("COLUMNS");
+    command
+}
+
 /// Runs `host-cal` in a folder.
 pub fn host_cal_in(folder: &Path, args: &[&str]) -> Run {
-    let output = Command::new(&*HOST_CAL)
-        .args(args)
-        .current_dir(folder)
-        .env("NO_COLOR", "1")
-        .env_remove("COLUMNS")
-        .output()
-        .expect("host-cal starts");
+    let output = host_cal_command(folder, args).output().expect("host-cal starts");
     let text = |bytes| String::from_utf8(bytes).expect("host-cal prints UTF-8");
     Run { code: output.status.code().expect("host-cal ends by itself"), stdout: text(output.stdout), stderr: text(output.stderr) }
 }

@@ -4,6 +4,7 @@
 //! `--json`. Progress and warnings go to stderr.
 
 mod apply;
+#[cfg(unix)]
 mod demo;
 mod fit;
 mod fk;
@@ -63,6 +64,7 @@ enum Command {
     Pose(pose::PoseArgs),
     #[cfg(unix)]
     VirtualBoard(virtual_board::VirtualBoardArgs),
+    #[cfg(unix)]
     Demo(demo::DemoArgs),
 }
 
@@ -89,6 +91,7 @@ impl Cli {
             Command::Pose(args) => args.run(),
             #[cfg(unix)]
             Command::VirtualBoard(args) => args.run(),
+            #[cfg(unix)]
             Command::Demo(args) => args.run(),
         }
     }

@@ -17,6 +17,7 @@ use crate::simulate::Shells;
 
 /// Far longer than anything here takes.
 const PATIENCE: Duration = Duration::from_secs(30);
+const REPEAT_HELLO: Duration = Duration::from_millis(300);
 
 /// The least that a host needs: frames out, messages in.
 struct Host {
@@ -47,19 +48,30 @@ impl Host {
         messages
     }
 
-    fn wait_for<T>(&mut self, mut pick: impl FnMut(ToHost) -> Option<T>) -> T {
-        let began = Instant::now();
-        loop {
-            if let Some(picked) = self.messages().into_iter().find_map(&mut pick) {
-                return picked;
-            }
-            assert!(began.elapsed() < PATIENCE, "nothing came");
-        }
+    fn wait_for<T>(&mut self, pick: impl FnMut(ToHost) -> Option<T>) -> T {
+        self.wait_at_most(PATIENCE, pick).expect("nothing came")
     }
 
+    fn wait_at_most<T>(&mut self, patience: Duration, mut pick: impl FnMut(ToHost) -> Option<T>) -> Option<T> {
+        let began = Instant::now();
+        while began.elapsed() < patience {
+            if let Some(picked) = self.messages().into_iter().find_map(&mut pick) {
+                return Some(picked);
+            }
+        }
+        None
+    }
+
+    /// Says hello until it is answered: a board that is just being reset hears nothing.
     fn hello(&mut self) -> BoardHello {
-        self.send(&ToBoard::Hello(HostHello { version: PROTOCOL }));
-        self.wait_for(|message| if let ToHost::Hello(hello) = message { Some(hello) } else { None })
+        for _ in 0..PATIENCE.as_millis() / REPEAT_HELLO.as_millis() {
+            self.send(&ToBoard::Hello(HostHello { version: PROTOCOL }));
+            let answer = |message| if let ToHost::Hello(hello) = message { Some(hello) } else { None };
+            if let Some(hello) = self.wait_at_most(REPEAT_HELLO, answer) {
+                return hello;
+            }
+        }
+        panic!("no hello");
     }
 
     fn ask(&mut self, command: Command) -> Result<Answer, Refusal> {

@@ -29,6 +29,9 @@ enum Link {
     Lost { hello: Box<BoardHello>, frames: FrameLine },
 }
 
+/// The parameters that a board uses, and the frame that they came in.
+pub(super) type RobotAndFrame = (RobotOnBoard, Vec<u8>);
+
 /// After this much silence the board is asked how it is.
 const SILENCE: Duration = Duration::from_secs(1);
 /// How often a lost port is tried again.
@@ -156,7 +159,7 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    fn regain(&self) -> Result<(BoardLink, Option<(RobotOnBoard, Vec<u8>)>), BoardError> {
+    fn regain(&self) -> Result<(BoardLink, Option<RobotAndFrame>), BoardError> {
         let mut link = BoardLink::connect(&self.args.port.port, self.args.port.baud)?;
         let robot = RobotOnBoard::read(&mut link)?;
         self.args.start(&mut link)?;

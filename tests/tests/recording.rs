@@ -1,0 +1,209 @@
+//! `host-cal stream --session` against a virtual board: what is kept when the program, the port or the disk is not.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use ballbar_tests::command::{Run, host_cal_command, host_cal_in};
+use host_cal::board::parameter_set;
+use host_cal::files::{Rig, Robot};
+use host_cal::session::{Description, LogReader, Record};
+use host_cal::simulate::Shells;
+use host_cal::virtual_board::{JointSpeed, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
+use tempfile::TempDir;
+
+const PAIRING: [&str; 4] = ["--pairing", "A:1", "--bar", "460"];
+/// Longer than anything here takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A board that is homed, holds the design's parameters, and whose robot visits `poses` poses as soon as a host streams.
+fn board(folder: &Path, poses: usize) -> VirtualBoard {
+    let (truth, design) = (Robot::open("puma560-optimised").unwrap(), Robot::open("puma560").unwrap());
+    let rig = Rig::open("triangles").unwrap();
+    let pairings = rig.all_pairings();
+    let shells = Shells {
+        planned_with: &design,
+        truth: &truth,
+        rig: &rig,
+        pairings: &pairings[..1],
+        bar_m: 0.46,
+        per_pairing: poses,
+        sigma_m: 84e-6,
+        seed: 7,
+    };
+    let speed = JointSpeed { revolute_rad_s: 20.0, ..JointSpeed::default() };
+    let script = Script::from_shells(&shells, 0.7, speed, || ()).unwrap();
+    let plant = Plant::new(&truth, 0.075, 7).unwrap();
+    let parameters = Some(parameter_set(&design, plant.lvdt()).unwrap());
+    let port_name = Some(folder.join("port"));
+    let options = VirtualBoardOptions { parameters, is_homed: true, port_name, ..VirtualBoardOptions::new(plant, Pace::Real) };
+    let mut board = VirtualBoard::start(options).unwrap();
+    board.play_with_stream(script);
+    board
+}
+
+fn start(folder: &Path, args: &[&str]) -> Child {
+    host_cal_command(folder, args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("host-cal starts")
+}
+
+fn finish(child: Child) -> Run {
+    let output = child.wait_with_output().expect("host-cal ends");
+    let text = |bytes| String::from_utf8(bytes).expect("host-cal prints UTF-8");
+    Run { code: output.status.code().expect("not killed"), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !is_so() {
+        assert!(began.elapsed() < PATIENCE, "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn lines_of(path: &Path) -> usize {
+    std::fs::read_to_string(path).map_or(0, |text| text.lines().count())
+}
+
+/// Asks a process to end, as Ctrl-C does.
+fn interrupt(child: &Child) {
+    let status = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(status.expect("there is a kill").success());
+}
+
+/// Whole and damaged frames of a session's log.
+fn frames(session: &Path) -> (usize, usize) {
+    let mut reader = LogReader::open(session).expect("a log");
+    let (mut whole, mut damaged) = (0, 0);
+    while let Some(record) = reader.next_record().expect("readable") {
+        match record {
+            Record::Message(_) => whole += 1,
+            Record::Damaged => damaged += 1,
+        }
+    }
+    (whole, damaged)
+}
+
+#[test]
+fn a_killed_recording_keeps_every_frame_and_is_gone_on_with() {
+    let folder = TempDir::new().unwrap();
+    let (folder, session) = (folder.path(), folder.path().join("s"));
+    let _board = board(folder, 60);
+    let args = [&["stream", "port", "--session", "s"], &PAIRING[..]].concat();
+    let mut killed = start(folder, &args);
+    wait_for("the first pose", || lines_of(&session.join("poses.csv")) >= 2);
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    let (whole, damaged) = frames(&session);
+    assert!(whole > 20 && damaged == 0, "{whole} whole frames, {damaged} damaged");
+    let poses_before = lines_of(&session.join("poses.csv"));
+
+    // As if it had been killed within a frame: half of one at the end of the log.
+    let mut log = std::fs::OpenOptions::new().append(true).open(session.join("stream.bbl")).unwrap();
+    log.write_all(&[7, 1, 2, 3]).unwrap();
+    drop(log);
+    let check = host_cal_in(folder, &["log", "check", "s", "--json"]);
+    assert_eq!((check.code, check.json()["unfinished_bytes"].as_u64()), (0, Some(4)), "a torn end is no loss");
+
+    let again = host_cal_in(folder, &[&args[..], &["--poses", "2", "--json"]].concat());
+    assert_eq!(again.code, 0, "{}", again.stderr);
+    assert_eq!(again.json()["poses_written"], 2);
+    assert_eq!(lines_of(&session.join("poses.csv")), poses_before + 2, "nothing lost, nothing doubled");
+    let (more, damaged) = frames(&session);
+    assert!(more > whole && damaged == 1, "the torn frame counts once, what follows is whole: {more} {damaged}");
+    let description = Description::read(&session).unwrap();
+    let ended: Vec<bool> = description.runs.iter().map(|run| run.ended.is_some()).collect();
+    assert_eq!(ended, [false, true], "the killed run has no end");
+}
+
+#[test]
+fn an_unplugged_board_is_waited_for_and_marked_as_a_gap() {
+    let folder = TempDir::new().unwrap();
+    let (folder, session) = (folder.path(), folder.path().join("s"));
+    let first = board(folder, 60);
+    let recording = start(folder, &[&["stream", "port", "--session", "s", "--poses", "3", "--json"], &PAIRING[..]].concat());
+    wait_for("the first pose", || lines_of(&session.join("poses.csv")) >= 2);
+    drop(first);
+    let _second = board(folder, 60);
+    let run = finish(recording);
+    assert_eq!(run.code, 1, "a gap is not nothing: {}", run.stderr);
+    assert!(run.stderr.contains("port: the board is away: ") && run.stderr.contains("port: the board is back"), "{}", run.stderr);
+    assert_eq!((run.json()["gaps"].as_u64(), run.json()["poses_written"].as_u64()), (Some(1), Some(3)));
+    assert_eq!(run.json()["losses"]["lost_on_line"], 0, "what the board did not send is a gap and not a loss");
+
+    let check = host_cal_in(folder, &["log", "check", "s", "--json"]);
+    assert_eq!((check.code, check.json()["gaps"].as_u64(), check.json()["damaged"].as_u64()), (1, Some(1), Some(0)));
+    assert_eq!(check.json()["samples"], run.json()["samples"]);
+    let exported = host_cal_in(folder, &["log", "export", "s", "--csv", "s.csv", "--json"]);
+    assert_eq!(exported.json()["samples"], run.json()["samples"]);
+    let table = std::fs::read_to_string(folder.join("s.csv")).unwrap();
+    assert_eq!(table.lines().count() as u64, run.json()["samples"].as_u64().unwrap() + 1);
+    let segments: std::collections::BTreeSet<&str> = table.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(segments.len(), 2, "two stretches with the gap between them: {segments:?}");
+}
+
+#[test]
+fn ctrl_c_ends_a_recording_with_its_report() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = board(folder, 60);
+    let recording = start(folder, &["stream", "port", "--session", "s", "--raw", "--json"]);
+    wait_for("a log", || std::fs::metadata(folder.join("s/stream.bbl")).is_ok_and(|log| log.len() > 20_000));
+    interrupt(&recording);
+    let run = finish(recording);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let samples = run.json()["samples"].as_u64().unwrap();
+    assert!(samples > 500, "{samples}");
+    assert_eq!(host_cal_in(folder, &["log", "check", "s", "--json"]).json()["samples"], samples);
+    assert!(Description::read(&folder.join("s")).unwrap().runs[0].ended.is_some());
+    let status = host_cal_in(folder, &["status", "port", "--json"]).json();
+    assert_eq!(status["streaming"], false, "the stream was ended on the board too");
+}
+
+#[test]
+fn a_recording_refuses_what_is_no_session_and_changes_nothing_there() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = board(folder, 60);
+    let session = folder.join("s");
+    let cases = [
+        ("stream.bbl", "not a log at all", "no log of a session"),
+        (
+            "stream.bbl",
+            "BBL1\u{7}\u{0}\u{1}\u{1}\u{1}\u{1}\u{1}\u{1}\u{1}\u{1}\u{0}",
+            "recorded with protocol 7 (0101010101010101)",
+        ),
+        ("session.toml", "runs = 3", "session.toml: "),
+        ("poses.csv", "chuck,sphere,q1_deg,length_mm\nA,1,1.0,460.0\n", "the columns are"),
+    ];
+    for (name, contents, message) in cases {
+        let _ = std::fs::remove_dir_all(&session);
+        std::fs::create_dir(&session).unwrap();
+        std::fs::write(session.join(name), contents).unwrap();
+        let run = host_cal_in(folder, &[&["stream", "port", "--session", "s", "--for", "1s"], &PAIRING[..]].concat());
+        assert!(run.code == 2 && run.stderr.contains(message), "{name}: {} {}", run.code, run.stderr);
+        assert_eq!(std::fs::read_to_string(session.join(name)).unwrap(), contents, "{name}");
+    }
+}
+
+#[test]
+fn the_poses_that_were_recorded_are_those_of_the_log_and_the_fit_reads_them() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = board(folder, 4);
+    let args = [&["stream", "port", "--session", "s", "--settled", "--poses", "4", "--rig", "triangles", "--json"], &PAIRING[..]]
+        .concat();
+    let run = host_cal_in(folder, &args);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert_eq!(
+        (run.json()["settled"].as_u64(), run.json()["samples"].as_u64()),
+        (Some(4), Some(0)),
+        "nothing else was asked for"
+    );
+    let rank = host_cal_in(folder, &["rank", "--robot", "puma560", "--rig", "triangles", "s/poses.csv", "--json"]);
+    assert_eq!(rank.json()["rank"], 4, "four lengths tell four things: {}", rank.stderr);
+    let validate =
+        host_cal_in(folder, &["validate", "--robot", "puma560-optimised", "--rig", "triangles", "s/poses.csv", "--json"]);
+    let rms_mm = validate.json()["rms_mm"].as_f64().unwrap();
+    assert!(rms_mm < 0.3, "the true robot explains what the board measured: {rms_mm} mm");
+}
