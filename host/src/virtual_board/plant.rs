@@ -45,6 +45,7 @@ pub struct Plant {
     waiting: VecDeque<Station>,
     speed: JointSpeed,
     now_us: u64,
+    scripts: u64,
     rng: ChaCha8Rng,
 }
 
@@ -108,6 +109,7 @@ impl Plant {
             waiting: VecDeque::new(),
             speed: JointSpeed::default(),
             now_us: 0,
+            scripts: 0,
             rng: ChaCha8Rng::seed_from_u64(seed),
         })
     }
@@ -131,6 +133,10 @@ impl Plant {
     /// Stations begin at the next call of [`Plant::at`], instead of what is left of an earlier script. A move under way is
     /// finished first, a stay at a station is not.
     pub fn play(&mut self, script: Script) {
+        // Noise of its own for every script: that of one does not depend on how long the robot stood before it.
+        self.scripts += 1;
+        self.rng.set_stream(self.scripts);
+        self.rng.set_word_pos(0);
         self.waiting = script.stations.into();
         self.speed = script.speed;
         match &mut self.phase {

@@ -1,0 +1,286 @@
+//! The commands with a board, against a virtual one: what they do, and what they refuse.
+
+use std::io::{Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use ballbar::JointVector;
+use ballbar::wire::{
+    Command, FrameReader, HostHello, MAX_FRAME, PROTOCOL, ProtocolVersion, Refusal, Request, ToBoard, ToHost, decode, encode,
+};
+use ballbar_tests::command::{Run, host_cal_in};
+use host_cal::board::{BAUD, BoardLink, Port, RobotOnBoard, nominal_lvdt, parameter_set};
+use host_cal::files::{Rig, Robot};
+use host_cal::virtual_board::{JointSpeed, Pace, Plant, Script, Station, VirtualBoard, VirtualBoardOptions};
+use serialport::SerialPort;
+use tempfile::TempDir;
+
+/// A board at `port` in the folder, with nothing in flash and nothing homed.
+fn bare_board(folder: &Path) -> VirtualBoard {
+    let plant = Plant::new(&Robot::open("puma560-optimised").unwrap(), 0.075, 7).unwrap();
+    let port_name = Some(folder.join("port"));
+    VirtualBoard::start(VirtualBoardOptions { port_name, ..VirtualBoardOptions::new(plant, Pace::Real) }).unwrap()
+}
+
+fn run(folder: &Path, args: &[&str]) -> Run {
+    host_cal_in(folder, args)
+}
+
+/// A run that ends well.
+fn good(folder: &Path, args: &[&str]) -> Run {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args:?}: {}{}", run.stdout, run.stderr);
+    run
+}
+
+/// A run that is refused, with words of its message.
+fn refused(folder: &Path, args: &[&str], words: &[&str]) {
+    let run = run(folder, args);
+    let message = run.stderr.split_whitespace().collect::<Vec<_>>().join(" ").replace("│ ", "");
+    assert!(run.code == 2 && words.iter().all(|word| message.contains(word)), "{args:?}: exit code {}: {message}", run.code);
+    assert_eq!(run.stdout, "", "{args:?}");
+}
+
+/// The built-in PUMA with a `[calibration]`, as a fit writes it.
+fn calibrated(folder: &Path) {
+    let simulate = ["simulate", "--robot", "puma560-optimised", "--plan-robot", "puma560", "--rig", "triangles"];
+    let simulate = [&simulate[..], &["--bar", "460", "--per-pair", "12", "--sigma-mm", "0.084", "--out", "poses.csv"]].concat();
+    good(folder, &simulate);
+    good(folder, &["fit", "--robot", "puma560", "--rig", "triangles", "poses.csv", "--out", "calibrated.toml"]);
+}
+
+#[test]
+fn apply_uploads_a_calibrated_robot_and_the_board_computes_with_it_after_a_reset() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = bare_board(folder);
+    calibrated(folder);
+
+    let empty = run(folder, &["status", "port", "--json"]);
+    assert_eq!((empty.code, empty.json()["robot"].is_null()), (1, true), "a bare board fails the tests of parameters");
+    let applied = good(folder, &["apply", "port", "--robot", "calibrated.toml", "--json"]);
+    let report = applied.json();
+    assert_eq!((report["vectors"].as_u64(), report["lvdt"].as_str()), (Some(1000), Some("nominal")));
+    assert!(applied.stderr.contains("host-cal lvdt"), "says what is missing: {}", applied.stderr);
+    let largest_um = report["max_position_difference_um"].as_f64().unwrap();
+    assert!(largest_um > 0.01 && largest_um < 1.0, "{largest_um} µm");
+
+    // Over a reset, the parameters stay and the homing goes.
+    let before = run(folder, &["status", "port", "--json"]).json();
+    let after = run(folder, &["status", "port", "--reset", "--json"]).json();
+    assert_eq!(after["robot"], before["robot"]);
+    assert_eq!((after["started_by"].as_str(), &after["robot"]["crc"]), (Some("a reset that was asked for"), &report["crc"]));
+    let unhomed = run(folder, &["pose", "port", "--json"]);
+    assert_eq!((unhomed.code, unhomed.json()["homed"].as_bool()), (1, Some(false)));
+
+    // Homed where `fk` is asked, board and host give the same pose.
+    let q = "10,-40,100,20,-30,50";
+    good(folder, &["home", "port", "--q", q]);
+    let pose = good(folder, &["pose", "port", "--json"]).json();
+    let fk = good(folder, &["fk", "--robot", "calibrated.toml", "--q", q, "--json"]).json();
+    for axis in 0..3 {
+        let [board, host] = [&pose, &fk].map(|document| document["position_mm"][axis].as_f64().unwrap());
+        // The encoders hold whole counts: half of one is 0.003 degrees, at a metre 0.06 mm.
+        assert!((board - host).abs() < 0.1, "axis {axis}: {board} and {host} mm");
+    }
+    assert_eq!(pose["calibrated"], true);
+}
+
+#[test]
+fn apply_refuses_what_should_not_be_on_a_board_and_keeps_what_is_there() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = bare_board(folder);
+    good(folder, &["apply", "port", "--robot", "puma560", "--uncalibrated", "--vectors", "20"]);
+    let before = run(folder, &["status", "port", "--json"]).json();
+
+    refused(folder, &["apply", "port", "--robot", "puma560"], &["puma560 (built in) has no [calibration]", "--uncalibrated"]);
+    let without = ["apply", "port", "--robot", "irb120", "--uncalibrated"];
+    refused(folder, &without, &["joint 1 has no `counts_per_rev`"]);
+    std::fs::write(folder.join("seven.toml"), robot_of_joints(7)).unwrap();
+    let seven = ["apply", "port", "--robot", "seven.toml", "--uncalibrated"];
+    refused(folder, &seven, &["seven.toml has 7 joints, but the board counts 6 encoders"]);
+    refused(folder, &["apply", "port", "--robot", "nowhere.toml"], &["nowhere.toml"]);
+
+    let after = run(folder, &["status", "port", "--json"]).json();
+    for what in ["robot", "slots", "staged_crc"] {
+        assert_eq!(after[what], before[what], "{what}");
+    }
+}
+
+/// A robot file of equal revolute joints with encoders.
+fn robot_of_joints(joints: usize) -> String {
+    let link = "[[links]]\ntranslation_mm = [10.0, 0.0, 100.0]\nrotation_deg = [0.0, 90.0, 0.0]\n";
+    let joint = "[[joints]]\ntype = \"revolute\"\noffset_deg = 0.0\nscale = 1.0\nmin_deg = -90.0\nmax_deg = 90.0\ncounts_per_rev = 8192\n";
+    link.repeat(joints + 1) + &joint.repeat(joints)
+}
+
+#[test]
+fn home_and_pose_refuse_a_board_without_parameters_and_wrong_joint_values() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = bare_board(folder);
+    refused(folder, &["home", "port", "--q", "0,0,0,0,0,0"], &["the board holds no parameters", "host-cal apply PORT"]);
+    refused(folder, &["pose", "port"], &["the board refuses `current pose`: it holds no parameters"]);
+    refused(folder, &["stream", "port", "--pose"], &["the board holds no parameters"]);
+    good(folder, &["apply", "port", "--robot", "puma560", "--uncalibrated", "--vectors", "20"]);
+    refused(folder, &["home", "port", "--q", "0,0,0"], &["--q has 3 values, but the robot has 6 joints"]);
+    refused(folder, &["home", "port", "--q", "nan,0,0,0,0,0"], &["--q is NaN"]);
+    refused(folder, &["home", "port", "--q", "1e9,0,0,0,0,0"], &["joint 1", "more than the board can hold"]);
+    let counts = good(folder, &["home", "port", "--q", "90,0,0,0,90,0", "--json"]).json()["counts"].clone();
+    // Joint 6 is turned along by 13/72 of joint 5, which its own encoder does not see.
+    assert_eq!(counts, serde_json::json!([-15653, 0, 0, 0, 17981, -3462]));
+}
+
+#[test]
+fn lvdt_finds_the_curve_of_the_simulated_lvdt_from_known_lengths() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let truth = Robot::open("puma560-optimised").unwrap();
+    let rig = Rig::open("triangles").unwrap();
+    let plant = Plant::new(&truth, 0.075, 7).unwrap();
+    let true_curve = plant.lvdt();
+    let parameters = Some(parameter_set(&truth, nominal_lvdt(0.075)).unwrap());
+    let port_name = Some(folder.join("port"));
+    let options = VirtualBoardOptions { parameters, port_name, ..VirtualBoardOptions::new(plant, Pace::Real) };
+    let mut board = VirtualBoard::start(options).unwrap();
+
+    // The arm stands; a micrometer sets the bar. Seen from the board, the length is off by as much.
+    let q = JointVector::zero();
+    let pairing = rig.pairing(rig.all_pairings()[0]);
+    let bar_m = ballbar::Kinematics::new(&truth.chain).length(&q, &pairing);
+    let offsets_mm = [-35.0, -25.0, -15.0, -5.0, 5.0, 15.0, 25.0, 35.0];
+    let station = |&mm: &f64| Station { q, pairing, bar_m, dwell_s: 0.9, length_error_m: mm / 1e3 };
+    let stations = offsets_mm.iter().map(station).collect();
+    board.play_with_stream(Script { stations, speed: JointSpeed::default() });
+
+    let lengths = offsets_mm.map(|mm| (460.0 + mm).to_string()).join(",");
+    let args = ["lvdt", "port", "--bar", "460", "--lengths", &lengths, "--hold-ms", "300", "--json"];
+    let report = good(folder, &args).json();
+    assert_eq!((report["outcome"].as_str(), report["points"].as_array().map(Vec::len)), (Some("stored"), Some(8)));
+    assert!(report["max_abs_mm"].as_f64().unwrap() < 0.003, "{report}");
+    let found_mm: Vec<f64> = report["coefficients_mm"].as_array().unwrap().iter().map(|c| c.as_f64().unwrap()).collect();
+    for (power, (found, expected)) in found_mm.iter().zip(true_curve.coefficients_m).enumerate() {
+        assert!((found - f64::from(expected) * 1e3).abs() < 0.02, "c{power}: {found} and {} mm", expected * 1e3);
+    }
+    let mut link = BoardLink::connect(board.port(), BAUD).unwrap();
+    let (robot, _) = RobotOnBoard::read(&mut link).unwrap().unwrap();
+    assert!((f64::from(robot.set().lvdt.coefficients_m[1]) * 1e3 - found_mm[1]).abs() < 1e-9, "it is in flash");
+}
+
+#[test]
+fn ports_that_are_absent_busy_or_silent_are_said_so() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    for command in ["stream", "status", "pose"] {
+        refused(folder, &[command, "/dev/no-such-port"], &["/dev/no-such-port: there is no such port"]);
+    }
+    let _board = bare_board(folder);
+    let taken = BoardLink::connect(&folder.join("port").to_string_lossy(), BAUD).unwrap();
+    refused(folder, &["status", "port"], &["port: the port cannot be opened", "another program"]);
+    drop(taken);
+    std::fs::write(folder.join("file"), "no port").unwrap();
+    refused(folder, &["status", "file"], &["file: the port cannot be opened"]);
+    let peer = Peer::start(|_| Vec::new());
+    refused(folder, &["status", &peer.name], &["no board answers", "Nothing at all was heard"]);
+}
+
+#[test]
+fn a_board_of_another_protocol_version_is_refused_with_both_versions() {
+    let folder = TempDir::new().unwrap();
+    let other = ProtocolVersion { number: PROTOCOL.number + 1, schema: [0xab; 8] };
+    // A hello whose later fields this program knows nothing of.
+    let peer = Peer::start(move |message| match message {
+        ToBoard::Hello(_) => frame(&(0_u8, other, "fields of another version", 7_u64)),
+        ToBoard::Request(_) => Vec::new(),
+    });
+    let theirs = format!("protocol {} (messages abababababababab)", other.number);
+    let ours = format!("this program {}", PROTOCOL.number);
+    for command in ["stream", "status", "pose"] {
+        refused(folder.path(), &[command, &peer.name], &[&theirs, &ours, "Flash the firmware"]);
+    }
+}
+
+#[test]
+fn a_board_that_is_greeted_by_a_host_of_another_version_takes_no_requests() {
+    let folder = TempDir::new().unwrap();
+    let board = bare_board(folder.path());
+    let mut link = BoardLink::connect(board.port(), BAUD).unwrap();
+    link.act(Command::SetRate { rate_hz: 500 }).unwrap();
+    drop(link);
+    let mut port = Port::open(board.port(), BAUD).unwrap();
+    let hello = HostHello { version: ProtocolVersion { number: 99, ..PROTOCOL } };
+    port.write_all(&frame(&ToBoard::Hello(hello))).unwrap();
+    let request = Request { id: 5, command: Command::SetRate { rate_hz: 200 } };
+    port.write_all(&frame(&ToBoard::Request(request))).unwrap();
+    let (mut reader, mut replies) = (FrameReader::new(), Vec::new());
+    let began = Instant::now();
+    while replies.len() < 2 && began.elapsed() < Duration::from_secs(20) {
+        let mut bytes = [0; 256];
+        let count = port.read(&mut bytes).unwrap();
+        for &byte in &bytes[..count] {
+            if let Some(Ok(payload)) = reader.push(byte) {
+                replies.extend(decode::<ToHost>(payload));
+            }
+        }
+    }
+    assert!(matches!(&replies[0], ToHost::Hello(hello) if hello.version == PROTOCOL), "{replies:?}");
+    let refusal = Err(Refusal::HelloFirst);
+    assert!(matches!(&replies[1], ToHost::Reply(reply) if reply.id == 5 && reply.outcome == refusal), "{replies:?}");
+}
+
+fn frame<T: serde::Serialize>(message: &T) -> Vec<u8> {
+    let mut buffer = [0; MAX_FRAME];
+    encode(message, &mut buffer).expect("fits").to_vec()
+}
+
+/// Something behind a serial port that is no board of ours.
+struct Peer {
+    name: String,
+    is_stopped: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Peer {
+    /// Answers every message with the bytes that `answer` makes of it.
+    fn start(answer: impl Fn(&ToBoard) -> Vec<u8> + Send + 'static) -> Self {
+        let (mut master, slave) = serialport::TTYPort::pair().expect("a pseudo-terminal");
+        let name = slave.name().expect("it has a name");
+        // Held open here, it would be locked for others.
+        drop(slave);
+        let is_stopped = Arc::new(AtomicBool::new(false));
+        let stop = Arc::clone(&is_stopped);
+        let thread = std::thread::spawn(move || {
+            master.set_timeout(Duration::from_millis(10)).expect("a timeout");
+            let mut reader = FrameReader::new();
+            while !stop.load(Ordering::Relaxed) {
+                let mut bytes = [0; 256];
+                // Nothing, or nobody has opened the port.
+                let count = master.read(&mut bytes).unwrap_or_else(|_| {
+                    std::thread::sleep(Duration::from_millis(5));
+                    0
+                });
+                for &byte in &bytes[..count] {
+                    if let Some(Ok(payload)) = reader.push(byte)
+                        && let Some(message) = decode(payload)
+                    {
+                        master.write_all(&answer(&message)).expect("written");
+                    }
+                }
+            }
+        });
+        Self { name, is_stopped, thread: Some(thread) }
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        self.is_stopped.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
