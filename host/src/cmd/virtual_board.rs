@@ -59,7 +59,7 @@ pub(super) struct VirtualBoardArgs {
     /// The same seed gives the same poses and noise
     #[arg(long, default_value_t = 7)]
     seed: u64,
-    /// How fast time passes for the robot
+    /// How fast time passes for the robot: as on the wall, or as fast as the host reads
     #[arg(long, value_enum, default_value_t = PaceArg::Real)]
     pace: PaceArg,
     /// Keep the board's flash in this file
@@ -86,9 +86,7 @@ pub(super) struct VirtualBoardArgs {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PaceArg {
-    /// As the wall clock
     Real,
-    /// As fast as it can be computed, and as the host reads
     Free,
 }
 
