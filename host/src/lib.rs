@@ -6,6 +6,8 @@
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
+//! | [`kinematics`] | where every link stands, and from tool poses back to joint vectors |
+//! | [`plan`] | which poses to measure, and the way between them |
 //! | [`simulate`] | poses on hemispherical shells, simulated lengths, tool error over the workspace |
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
@@ -18,7 +20,9 @@ pub mod board;
 pub mod cmd;
 pub mod files;
 pub mod identify;
+pub mod kinematics;
 pub mod paper;
+pub mod plan;
 pub mod session;
 pub mod simulate;
 pub mod units;

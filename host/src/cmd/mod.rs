@@ -15,6 +15,8 @@ mod log;
 mod lvdt;
 mod outcome;
 mod paper;
+mod plan;
+mod plan_report;
 mod port;
 mod ports;
 mod pose;
@@ -52,6 +54,7 @@ enum Command {
     Validate(validate::ValidateArgs),
     Rank(rank::RankArgs),
     Fk(fk::FkArgs),
+    Plan(plan::PlanArgs),
     Simulate(simulate::SimulateArgs),
     Paper(paper::PaperArgs),
     Ports(ports::PortsArgs),
@@ -79,6 +82,7 @@ impl Cli {
             Command::Validate(args) => args.run(),
             Command::Rank(args) => args.run(),
             Command::Fk(args) => args.run(),
+            Command::Plan(args) => args.run(),
             Command::Simulate(args) => args.run(),
             Command::Paper(args) => args.run(),
             Command::Ports(args) => args.run(),

@@ -4,19 +4,24 @@
 //! the field, what was found and what was expected. Files are written under a temporary name and renamed.
 
 mod builtin;
+mod csv_rows;
 mod numbers;
+mod plan_rows;
 mod poses;
 mod problem;
 mod read_poses;
 mod rig;
 mod robot;
+mod solids;
 mod source;
 mod write;
 
 pub use builtin::{RIGS, ROBOTS};
+pub use plan_rows::{BarAt, PlanRow, RowKind, RowMargins, read_plan, write_plan};
 pub use poses::{Dataset, PoseRow, RowWarning, pose_header, pose_record, write_poses};
 pub use problem::Problem;
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{Calibration, EncoderFacts, JointLimits, NoEncoders, Robot};
+pub use solids::Solids;
 pub use source::{InputError, Source};
 pub use write::{WriteError, write_atomically};

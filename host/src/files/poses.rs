@@ -146,7 +146,7 @@ pub fn pose_record(
     csv_record(fields.chain(optional.iter().cloned()))
 }
 
-fn csv_record(fields: impl Iterator<Item = String>) -> String {
+pub(super) fn csv_record(fields: impl Iterator<Item = String>) -> String {
     let mut writer = csv::WriterBuilder::new().terminator(csv::Terminator::Any(b'\n')).from_writer(Vec::new());
     // Writing to memory cannot fail.
     let _ = writer.write_record(fields.collect::<Vec<_>>());

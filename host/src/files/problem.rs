@@ -108,11 +108,21 @@ pub enum Problem {
     #[error("the name {0:?} is empty or holds a comma, colon, quote, `#`, control character or white space at its ends")]
     Name(String),
     /// The poses' header lacks a column.
-    #[error("the column `{0}` is missing")]
-    MissingColumn(String),
+    #[error("the column `{name}` is missing")]
+    MissingColumn {
+        /// The column.
+        name: String,
+        /// What a header has.
+        expected: &'static str,
+    },
     /// The poses' header has a column that no robot file asks for.
-    #[error("unknown column `{0}`")]
-    UnknownColumn(String),
+    #[error("unknown column `{name}`")]
+    UnknownColumn {
+        /// The column.
+        name: String,
+        /// What a header has.
+        expected: &'static str,
+    },
     /// A joint's column has the unit of the other kind of joint.
     #[error("column `{found}`, but joint {joint} is {kind}: expected `{expected}`")]
     ColumnUnit {
@@ -132,6 +142,8 @@ pub enum Problem {
         found: usize,
         /// Joints of the robot.
         expected: usize,
+        /// What a header has.
+        header: &'static str,
     },
     /// A row with more or fewer fields than the header.
     #[error("{found} fields, expected {expected} as in the header")]
@@ -177,6 +189,24 @@ pub enum Problem {
     /// `sigma_mm` in one file of poses and not in another.
     #[error("`sigma_mm` is given here and not in the files before, or the other way round")]
     MixedSigma,
+    /// A field that has to be one of some words.
+    #[error("column `{column}` is `{found}`, expected {expected}")]
+    Word {
+        /// The column.
+        column: &'static str,
+        /// What stands there.
+        found: String,
+        /// The words.
+        expected: &'static str,
+    },
+    /// A plan's length is not that of this robot at this rig.
+    #[error("the plan expects a length of {planned_mm:.3} mm, but this robot at this rig has {length_mm:.3} mm here")]
+    PlanOfAnother {
+        /// The length in the plan, millimetres.
+        planned_mm: f64,
+        /// The length by the robot and rig given, millimetres.
+        length_mm: f64,
+    },
 }
 
 impl Problem {
@@ -190,8 +220,8 @@ impl Problem {
             Self::FieldCount { .. } => "Is there a decimal comma? Numbers are written with a point, fields are parted by commas.",
             Self::OpenQuote => "Close the quote, or write the field without quotes.",
             Self::NoBarLength => "lengths_mm holds the bar's length at mid travel, one for each extension.",
-            Self::JointColumns { found: 0, .. } => {
-                "The first line must be the header, parted by commas: chuck,sphere,q1_deg,…,qJ_deg,length_mm."
+            Self::JointColumns { found: 0, header, .. } => {
+                return Some(format!("The first line must be the header, parted by commas: {header}."));
             }
             Self::Toml(_) => "The keys and their units are in docs/files.md.",
             Self::JointCount { .. } | Self::LinkCount { .. } => "A chain is link 1, joint 1, link 2, … joint J, link J+1.",
@@ -205,11 +235,15 @@ impl Problem {
             Self::Empty(_) => "A rig needs chucks and spheres.",
             Self::Duplicate { .. } => "Give each a name of its own.",
             Self::Name(_) => "Poses and pairings (A:1,B:2) refer to chucks and spheres by these names.",
-            Self::MissingColumn(_) | Self::UnknownColumn(_) | Self::JointColumns { .. } => {
-                "Expected: chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); optional: sigma_mm, set, t_s."
-            }
+            Self::MissingColumn { expected, .. }
+            | Self::UnknownColumn { expected, .. }
+            | Self::JointColumns { header: expected, .. } => return Some(format!("Expected: {expected}.")),
             Self::UnknownEnd { .. } => "Names are compared letter by letter; is this the rig that was measured with?",
             Self::NoPoses => "Was the recording stopped before the first pose settled?",
+            Self::Word { .. } => return None,
+            Self::PlanOfAnother { .. } => {
+                "Was it planned for another robot, or has the robot's or the rig's file changed since? Plan again."
+            }
             Self::MixedSigma => "Weights compare poses with one another: give `sigma_mm` for every pose, or for none.",
         };
         Some(help.to_owned())

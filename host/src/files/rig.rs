@@ -7,6 +7,7 @@ use toml::Spanned;
 use super::builtin::RIGS;
 use super::numbers::{Range, deserialize, in_range, vector};
 use super::problem::Problem;
+use super::solids::{Solids, SolidsToml};
 use super::source::{InputError, Source};
 use crate::units::m_from_mm;
 
@@ -53,6 +54,8 @@ pub struct Rig {
     pub spheres: Vec<NamedPoint>,
     /// The bar, where the file describes it.
     pub bar: Option<Bar>,
+    /// Sizes of what must not meet, for planning.
+    pub solids: Solids,
 }
 
 #[derive(Deserialize)]
@@ -61,6 +64,8 @@ struct RigToml {
     chucks: Vec<PointToml>,
     spheres: Vec<PointToml>,
     bar: Option<BarToml>,
+    #[serde(default)]
+    solids: SolidsToml,
 }
 
 #[derive(Deserialize)]
@@ -96,6 +101,7 @@ impl Rig {
             chucks: points(source, "chuck", &file.chucks)?,
             spheres: points(source, "sphere", &file.spheres)?,
             bar: file.bar.map(|bar| read_bar(source, &bar)).transpose()?,
+            solids: file.solids.read(source)?,
         })
     }
 

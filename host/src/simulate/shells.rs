@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use ballbar::{JointVector, Kinematics, MAX_PARAMETERS, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Vector3};
+use ballbar::{Kinematics, Vector3};
 use miette::Diagnostic;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,6 +10,7 @@ use rand_distr::{Distribution, Normal};
 use thiserror::Error;
 
 use crate::files::{PairingId, PoseRow, Rig, Robot};
+use crate::kinematics::Skeleton;
 use crate::units::{mm_from_m, tidy};
 
 /// A simulated experiment: which shells, how many poses on each, and how noisy the bar is.
@@ -77,7 +78,7 @@ impl Shells<'_> {
     /// # Errors
     /// [`ShellError::OutOfReach`] when a shell has too few points that the robot reaches.
     pub fn simulate(&self, mut on_pose: impl FnMut()) -> Result<Vec<ShellPose>, ShellError> {
-        let planned = Kinematics::new(&self.planned_with.chain);
+        let planned = Skeleton::new(&self.planned_with.chain);
         let truth = Kinematics::new(&self.truth.chain);
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         // Noise has a stream of its own: its size changes no pose, as long as it keeps the length within the bar's travel.
@@ -112,7 +113,7 @@ impl Shells<'_> {
 
     fn attempt(
         &self,
-        planned: &Kinematics<f64>,
+        planned: &Skeleton,
         truth: &Kinematics<f64>,
         id: PairingId,
         noise_m: f64,
@@ -127,7 +128,10 @@ impl Shells<'_> {
         let pairing = self.rig.pairing(id);
         let target_m = pairing.chuck_base_m + along_bar * self.bar_m;
         let start = self.planned_with.chain.joint_vector(&start).ok()?;
-        let q = self.reach(planned, start, &pairing.sphere_tool_m, &target_m)?;
+        let q = planned.reach_point(&start, &pairing.sphere_tool_m, &target_m)?;
+        if !self.planned_with.limits.iter().zip(q.as_array()).all(|(limits, &q)| limits.contain(q)) {
+            return None;
+        }
         let length_m = truth.length(&q, &pairing) + noise_m;
         let within_travel = self.rig.bar.as_ref().is_none_or(|bar| (length_m - self.bar_m).abs() <= bar.travel_m / 2.0);
         (within_travel && length_m > 0.0).then(|| ShellPose {
@@ -144,53 +148,4 @@ impl Shells<'_> {
             longitude_rad,
         })
     }
-
-    /// Joint vector within limits that brings a point of the tool to `target_m`: damped least-squares steps from `start`.
-    fn reach(
-        &self,
-        kinematics: &Kinematics<f64>,
-        mut q: JointVector<f64>,
-        point_tool_m: &Vector3<f64>,
-        target_m: &Vector3<f64>,
-    ) -> Option<JointVector<f64>> {
-        const STEPS: usize = 30;
-        const TOLERANCE_M: f64 = 1e-9;
-        const DAMPING: f64 = 1e-4;
-        let chain = &self.planned_with.chain;
-        for _ in 0..STEPS {
-            let point_m = kinematics.point_in_base(&q, point_tool_m);
-            let error_m = target_m - point_m;
-            if error_m.norm() < TOLERANCE_M {
-                let within = self.planned_with.limits.iter().zip(q.as_array()).all(|(limits, &q)| limits.contain(q));
-                return within.then_some(q);
-            }
-            let columns = position_columns(kinematics, chain, &q, &point_m);
-            let gram = columns.iter().fold(Matrix3::identity() * DAMPING, |sum, column| sum + column * column.transpose());
-            let pull = gram.cholesky()?.solve(&error_m);
-            for (value, column) in q.as_array_mut().iter_mut().zip(&columns) {
-                *value += column.dot(&pull);
-            }
-        }
-        None
-    }
-}
-
-/// `∂point/∂q` of each joint, by the wrenches of three unit forces at the point.
-fn position_columns(
-    kinematics: &Kinematics<f64>,
-    chain: &ballbar::Chain<f64>,
-    q: &JointVector<f64>,
-    point_m: &Vector3<f64>,
-) -> Vec<Vector3<f64>> {
-    let mut columns = vec![Vector3::zeros(); chain.joints()];
-    let mut row = [0.0; MAX_PARAMETERS];
-    for axis in 0..3 {
-        let force = Vector3::ith(axis, 1.0);
-        kinematics.wrench_columns(q, force, point_m.cross(&force), &mut row);
-        for (joint, column) in columns.iter_mut().enumerate() {
-            let offset_column = row[joint * PARAMETERS_PER_JOINT + ParameterKind::Offset as usize];
-            column[axis] = offset_column * chain.joint(joint).map_or(0.0, |joint| joint.scale);
-        }
-    }
-    columns
 }

@@ -1,0 +1,230 @@
+//! What files of poses and plans have in common: a header, joints' columns as the robot has them, a chuck and a sphere of the rig,
+//! and the place of whatever is wrong.
+
+use std::ops::Range;
+
+use ballbar::{JointKind, JointVector};
+use csv::{ReaderBuilder, StringRecord, Trim};
+
+use super::numbers::Range as Of;
+use super::poses::joint_column;
+use super::problem::Problem;
+use super::rig::{NamedPoint, PairingId, Rig};
+use super::robot::Robot;
+use super::source::{InputError, Source};
+use crate::units::ScreenUnit;
+
+/// A CSV text, being read.
+pub(super) struct CsvRows<'a> {
+    pub(super) source: &'a Source,
+    pub(super) robot: &'a Robot,
+    pub(super) rig: &'a Rig,
+    header: StringRecord,
+    records: Vec<StringRecord>,
+    /// What a header may have, for messages.
+    expected_header: &'static str,
+}
+
+impl<'a> CsvRows<'a> {
+    /// Splits the text into records and checks the header against the robot's joints and the `other` columns.
+    pub(super) fn split(
+        source: &'a Source,
+        robot: &'a Robot,
+        rig: &'a Rig,
+        other: &[&str],
+        expected_header: &'static str,
+    ) -> Result<Self, InputError> {
+        let mut reader =
+            ReaderBuilder::new().comment(Some(b'#')).trim(Trim::All).flexible(true).from_reader(source.text().as_bytes());
+        let broken = |error: csv::Error| InputError::of_file(source.name(), Problem::Csv(error.to_string()));
+        if source.text().trim().is_empty() {
+            return Err(InputError::of_file(source.name(), Problem::NoPoses));
+        }
+        let header = reader.headers().map_err(broken)?.clone();
+        let mut rows = Self { source, robot, rig, header, records: Vec::new(), expected_header };
+        rows.check_header(other)?;
+        for record in reader.records() {
+            let record = record.map_err(broken)?;
+            // A line of white space is as empty as an empty one.
+            if record.len() > 1 || !record[0].is_empty() {
+                rows.check_fields(&record)?;
+                rows.records.push(record);
+            }
+        }
+        if rows.records.is_empty() {
+            return Err(InputError::of_file(source.name(), Problem::NoPoses));
+        }
+        Ok(rows)
+    }
+
+    /// The rows.
+    pub(super) fn records(&self) -> &[StringRecord] {
+        &self.records
+    }
+
+    /// Where a column stands; `None` when it is not there.
+    pub(super) fn optional(&self, name: &str) -> Option<usize> {
+        self.header.iter().position(|other| other == name)
+    }
+
+    /// Where a column stands.
+    pub(super) fn required(&self, name: &str) -> Result<usize, InputError> {
+        let missing = || Problem::MissingColumn { name: name.to_owned(), expected: self.expected_header };
+        self.optional(name).ok_or_else(|| self.refuse_header(missing()))
+    }
+
+    /// Where the joints' columns stand.
+    pub(super) fn joints(&self) -> Result<Vec<usize>, InputError> {
+        self.joint_columns().map(|name| self.required(&name)).collect()
+    }
+
+    /// The chuck and the sphere that a row names.
+    pub(super) fn pairing(&self, record: &StringRecord, chuck: usize, sphere: usize) -> Result<PairingId, InputError> {
+        Ok(PairingId {
+            chuck: self.end(record, chuck, "chuck", Rig::chuck, &self.rig.chucks)?,
+            sphere: self.end(record, sphere, "sphere", Rig::sphere, &self.rig.spheres)?,
+        })
+    }
+
+    /// The joints of a row, SI.
+    pub(super) fn joint_vector(&self, record: &StringRecord, columns: &[usize]) -> Result<JointVector<f64>, InputError> {
+        let mut q = Vec::with_capacity(columns.len());
+        for (&column, &kind) in columns.iter().zip(self.robot.chain.joint_kinds()) {
+            q.push(ScreenUnit::from(kind).to_si(self.number(record, column, Of::Plausible)?));
+        }
+        let refuse = |error: ballbar::ChainError| self.refuse_row(record, Problem::Csv(error.to_string()));
+        self.robot.chain.joint_vector(&q).map_err(refuse)
+    }
+
+    /// A number of a row.
+    pub(super) fn number(&self, record: &StringRecord, column: usize, range: Of) -> Result<f64, InputError> {
+        let (name, found) = (self.header[column].to_owned(), record[column].to_owned());
+        let problem = match found.parse::<f64>() {
+            Ok(number) if range.contains(number) => return Ok(number),
+            Ok(_) => Problem::Number { field: name, found, expected: range.words() },
+            Err(_) if found.is_empty() => Problem::EmptyField { column: name },
+            Err(_) => Problem::NotANumber { column: name, found },
+        };
+        Err(self.refuse_field(record, column, problem))
+    }
+
+    /// Line of a row, from 1.
+    pub(super) fn line(&self, record: &StringRecord) -> usize {
+        self.locate(record).0
+    }
+
+    /// A problem of one field.
+    pub(super) fn refuse_field(&self, record: &StringRecord, column: usize, problem: Problem) -> InputError {
+        InputError::at(self.source, self.field_span(record, column), problem)
+    }
+
+    fn refuse_row(&self, record: &StringRecord, problem: Problem) -> InputError {
+        InputError::at(self.source, self.locate(record).1, problem)
+    }
+
+    fn refuse_header(&self, problem: Problem) -> InputError {
+        self.refuse_row(&self.header, problem)
+    }
+
+    fn check_header(&self, other: &[&str]) -> Result<(), InputError> {
+        for (i, name) in self.header.iter().enumerate() {
+            if self.header.iter().take(i).any(|other| other == name) {
+                return Err(self.refuse_header(Problem::Duplicate { what: "column", name: name.to_owned() }));
+            }
+        }
+        self.check_joint_columns().map_err(|problem| self.refuse_header(problem))?;
+        let is_known = |name: &str| other.contains(&name) || self.joint_columns().any(|joint| joint == name);
+        if let Some(name) = self.header.iter().find(|name| !is_known(name)) {
+            let problem = Problem::UnknownColumn { name: name.to_owned(), expected: self.expected_header };
+            return Err(self.refuse_header(problem));
+        }
+        Ok(())
+    }
+
+    fn joint_columns(&self) -> impl Iterator<Item = String> + '_ {
+        self.robot.chain.joint_kinds().iter().enumerate().map(|(i, &kind)| joint_column(i, kind))
+    }
+
+    /// Joint columns whose unit does not fit, or that are not as many as the robot's joints.
+    fn check_joint_columns(&self) -> Result<(), Problem> {
+        let kinds = self.robot.chain.joint_kinds();
+        let mut found = 0;
+        for name in &self.header {
+            let Some((number, unit)) = parse_joint_column(name) else { continue };
+            found += 1;
+            let Some(&kind) = kinds.get(number - 1) else { continue };
+            if unit != ScreenUnit::from(kind).name() {
+                let kind_name = match kind {
+                    JointKind::Revolute => "revolute",
+                    JointKind::Prismatic => "prismatic",
+                };
+                let expected = joint_column(number - 1, kind);
+                return Err(Problem::ColumnUnit { found: name.to_owned(), expected, joint: number, kind: kind_name });
+            }
+        }
+        if found == kinds.len() {
+            return Ok(());
+        }
+        Err(Problem::JointColumns { found, expected: kinds.len(), header: self.expected_header })
+    }
+
+    fn check_fields(&self, record: &StringRecord) -> Result<(), InputError> {
+        if record.iter().any(|field| field.contains('\n')) {
+            return Err(self.refuse_row(record, Problem::OpenQuote));
+        }
+        if record.len() != self.header.len() {
+            return Err(self.refuse_row(record, Problem::FieldCount { found: record.len(), expected: self.header.len() }));
+        }
+        Ok(())
+    }
+
+    fn end(
+        &self,
+        record: &StringRecord,
+        column: usize,
+        what: &'static str,
+        find: fn(&Rig, &str) -> Option<usize>,
+        points: &[NamedPoint],
+    ) -> Result<usize, InputError> {
+        let found = &record[column];
+        find(self.rig, found).ok_or_else(|| {
+            let known = points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>().join(", ");
+            self.refuse_field(record, column, Problem::UnknownEnd { what, found: found.to_owned(), known })
+        })
+    }
+
+    /// Number (from 1) and bytes of a record's line. The reader's own position is before the comments and empty lines that it
+    /// skipped on the way.
+    fn locate(&self, record: &StringRecord) -> (usize, Range<usize>) {
+        let (mut number, mut start) = record.position().map_or((1, 0), |at| (at.line() as usize, at.byte() as usize));
+        loop {
+            let line = self.source.text()[start..].split('\n').next().unwrap_or_default();
+            let skipped = line.trim().is_empty() || line.starts_with('#');
+            if !skipped || start + line.len() >= self.source.text().len() {
+                return (number, start..start + line.trim_end().len());
+            }
+            start += line.len() + 1;
+            number += 1;
+        }
+    }
+
+    /// The bytes of one field; of the whole line where quotes hide the commas.
+    fn field_span(&self, record: &StringRecord, column: usize) -> Range<usize> {
+        let line_span = self.locate(record).1;
+        let line = &self.source.text()[line_span.clone()];
+        if line.contains('"') {
+            return line_span;
+        }
+        let start = line_span.start + line.split(',').take(column).map(|field| field.len() + 1).sum::<usize>();
+        let field = line.split(',').nth(column).unwrap_or_default();
+        let lead = field.len() - field.trim_start().len();
+        start + lead..start + lead + field.trim().len().max(1)
+    }
+}
+
+/// Number (from 1) and unit of a joint's column.
+fn parse_joint_column(name: &str) -> Option<(usize, &str)> {
+    let (number, unit) = name.strip_prefix('q')?.split_once('_')?;
+    let number = number.parse().ok().filter(|&number| number >= 1)?;
+    Some((number, unit))
+}

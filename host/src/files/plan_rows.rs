@@ -1,0 +1,191 @@
+//! `plan.csv`: poses to measure and via points, in the order in which the robot goes through them.
+
+use ballbar::{JointKind, JointVector, Kinematics};
+use csv::StringRecord;
+
+use super::csv_rows::CsvRows;
+use super::numbers::Range as Of;
+use super::poses::{csv_record, joint_column};
+use super::problem::Problem;
+use super::rig::{PairingId, Rig};
+use super::robot::Robot;
+use super::source::{InputError, Source};
+use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
+
+/// What happens at a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RowKind {
+    /// The robot goes through.
+    Via,
+    /// The robot stands still and the bar is read.
+    Measure,
+}
+
+/// How the bar stands at a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BarAt {
+    /// Elevation above the table, radians.
+    pub latitude_rad: f64,
+    /// Azimuth from the base's x towards its y, 0 to 2π radians.
+    pub longitude_rad: f64,
+    /// Length by the nominal robot, metres.
+    pub length_m: f64,
+}
+
+/// What is left at a row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowMargins {
+    /// To the nearer end of the bar's travel, less what plausible robots may be off, metres; `None` without the bar.
+    pub travel_m: Option<f64>,
+    /// Between the two nearest solids, metres.
+    pub clearance_m: f64,
+    /// Which these are.
+    pub nearest: String,
+    /// Of the revolute joint nearest to a limit, radians; infinite without one.
+    pub limit_rad: f64,
+    /// Of the prismatic joint nearest to a limit, metres; infinite without one.
+    pub limit_m: f64,
+    /// Smallest singular value of the tool's Jacobian, lengths divided by the arm's.
+    pub singularity: f64,
+}
+
+/// One row of a plan. The robot comes to it from the row before by joint interpolation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanRow {
+    /// Go through or measure.
+    pub kind: RowKind,
+    /// Which chuck and sphere the bar joins, or will join.
+    pub pairing: PairingId,
+    /// Length of the bar at mid travel, metres.
+    pub bar_m: f64,
+    /// Encoder outputs, radians or metres.
+    pub q: JointVector<f64>,
+    /// `None` while the bar is off.
+    pub bar: Option<BarAt>,
+    /// `None` in a plan that was read, since the file's are for people.
+    pub margins: Option<RowMargins>,
+    /// Line in the file that it was read from, from 1; 0 in a new plan.
+    pub line: usize,
+}
+
+const MARGINS: [&str; 6] = ["travel_margin_mm", "clearance_mm", "nearest", "limit_margin_deg", "limit_margin_mm", "singularity"];
+
+/// The text of a plan; columns as the robot's joints need them.
+pub fn write_plan(robot: &Robot, rig: &Rig, rows: &[PlanRow]) -> String {
+    let kinds = robot.chain.joint_kinds();
+    let has = |kind| kinds.contains(&kind);
+    let is_there = |name: &str| match name {
+        "limit_margin_deg" => has(JointKind::Revolute),
+        "limit_margin_mm" => has(JointKind::Prismatic),
+        _ => true,
+    };
+    let joints = kinds.iter().enumerate().map(|(i, &kind)| joint_column(i, kind));
+    let words = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>();
+    let header = words(&["kind", "chuck", "sphere", "bar_mm"])
+        .into_iter()
+        .chain(joints)
+        .chain(words(&["latitude_deg", "longitude_deg", "length_mm"]))
+        .chain(words(&MARGINS).into_iter().filter(|name| is_there(name)));
+    let mut text = csv_record(header) + "\n";
+    for row in rows {
+        let number = |value: f64, decimals: usize| format!("{value:.decimals$}");
+        let kind = match row.kind {
+            RowKind::Via => "via",
+            RowKind::Measure => "measure",
+        };
+        let (chuck, sphere) = (&rig.chucks[row.pairing.chuck].name, &rig.spheres[row.pairing.sphere].name);
+        let mut fields = vec![kind.to_owned(), chuck.clone(), sphere.clone(), number(mm_from_m(row.bar_m), 3)];
+        // As in files of poses: nanodegrees and nanometres.
+        fields.extend(kinds.iter().zip(row.q.as_array()).map(|(&kind, &q)| number(ScreenUnit::from(kind).from_si(q), 9)));
+        match row.bar {
+            Some(bar) => fields.extend([
+                number(bar.latitude_rad.to_degrees(), 4),
+                number(bar.longitude_rad.to_degrees(), 4),
+                number(mm_from_m(bar.length_m), 6),
+            ]),
+            None => fields.extend([const { String::new() }; 3]),
+        }
+        if let Some(margins) = &row.margins {
+            let travel = margins.travel_m.map_or_else(String::new, |travel_m| number(mm_from_m(travel_m), 3));
+            fields.extend([travel, number(mm_from_m(margins.clearance_m), 2), margins.nearest.clone()]);
+            fields.extend(has(JointKind::Revolute).then(|| number(margins.limit_rad.to_degrees(), 3)));
+            fields.extend(has(JointKind::Prismatic).then(|| number(mm_from_m(margins.limit_m), 3)));
+            fields.push(number(margins.singularity, 4));
+        }
+        text += &(csv_record(fields.into_iter()) + "\n");
+    }
+    text
+}
+
+/// Where each column of a header stands.
+struct Columns {
+    kind: usize,
+    chuck: usize,
+    sphere: usize,
+    bar: usize,
+    q: Vec<usize>,
+    latitude: usize,
+    longitude: usize,
+    length: usize,
+}
+
+/// Reads a plan, and proves by its lengths that it is one of this robot at this rig.
+///
+/// # Errors
+/// [`InputError`] naming the line and the column that is wrong.
+pub fn read_plan(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PlanRow>, InputError> {
+    const HEADER: &str = "kind,chuck,sphere,bar_mm,q1_deg,…,qJ_deg,latitude_deg,longitude_deg,length_mm (qi_mm for a prismatic joint), \
+                          then margins, as `host-cal plan` writes them";
+    let plain = ["kind", "chuck", "sphere", "bar_mm", "latitude_deg", "longitude_deg", "length_mm"];
+    let rows = CsvRows::split(source, robot, rig, &[&plain[..], &MARGINS].concat(), HEADER)?;
+    let columns = Columns {
+        kind: rows.required("kind")?,
+        chuck: rows.required("chuck")?,
+        sphere: rows.required("sphere")?,
+        bar: rows.required("bar_mm")?,
+        q: rows.joints()?,
+        latitude: rows.required("latitude_deg")?,
+        longitude: rows.required("longitude_deg")?,
+        length: rows.required("length_mm")?,
+    };
+    let kinematics = Kinematics::new(&robot.chain);
+    rows.records().iter().map(|record| read_row(&rows, &columns, &kinematics, record)).collect()
+}
+
+fn read_row(
+    rows: &CsvRows<'_>,
+    columns: &Columns,
+    kinematics: &Kinematics<f64>,
+    record: &StringRecord,
+) -> Result<PlanRow, InputError> {
+    let kind = match &record[columns.kind] {
+        "via" => RowKind::Via,
+        "measure" => RowKind::Measure,
+        found => {
+            let problem = Problem::Word { column: "kind", found: found.to_owned(), expected: "`via` or `measure`" };
+            return Err(rows.refuse_field(record, columns.kind, problem));
+        }
+    };
+    let pairing = rows.pairing(record, columns.chuck, columns.sphere)?;
+    let q = rows.joint_vector(record, &columns.q)?;
+    let is_attached = kind == RowKind::Measure || !record[columns.length].is_empty();
+    let bar = if is_attached {
+        let angle = |column| Ok::<f64, InputError>(rows.number(record, column, Of::Plausible)?.to_radians());
+        Some(BarAt {
+            latitude_rad: angle(columns.latitude)?,
+            longitude_rad: angle(columns.longitude)?,
+            length_m: m_from_mm(rows.number(record, columns.length, Of::Positive)?),
+        })
+    } else {
+        None
+    };
+    /// Lengths are written to the nanometre, from joints to the nanodegree.
+    const SAME_M: f64 = 1e-6;
+    let length_m = kinematics.length(&q, &rows.rig.pairing(pairing));
+    if let Some(planned) = bar.filter(|planned| (planned.length_m - length_m).abs() > SAME_M) {
+        let problem = Problem::PlanOfAnother { planned_mm: mm_from_m(planned.length_m), length_mm: mm_from_m(length_m) };
+        return Err(rows.refuse_field(record, columns.length, problem));
+    }
+    let bar_m = m_from_mm(rows.number(record, columns.bar, Of::Positive)?);
+    Ok(PlanRow { kind, pairing, bar_m, q, bar, margins: None, line: rows.line(record) })
+}

@@ -1,0 +1,121 @@
+//! How well a set of poses will tell the parameters, before any is measured.
+
+use ballbar::{Chain, FreeParameters, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Parameter, Vector3};
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::cell::plausible_deviation;
+use crate::files::JointLimits;
+use crate::identify::{Identifiability, Observation, Spectrum};
+
+/// Indices of observability of a set of poses, from the singular values `σ` of its Jacobian over an independent subset of parameters,
+/// each column times the parameter's plausible deviation: millimetres of length a deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// Poses.
+    pub poses: usize,
+    /// Parameters of the subset.
+    pub parameters: usize,
+    /// `log10 det(JᵀJ)`, with lengths in millimetres. Largest for D-optimal sets.
+    pub log10_determinant: f64,
+    /// `(Π σ)^(1/k) / √poses`, which does not grow with the poses (J.-H. Borm and C.-H. Menq, Int. J. Robotics Research 10(1), 1991).
+    pub mean_sensitivity_mm: f64,
+    /// Largest over smallest singular value.
+    pub condition: f64,
+    /// Smallest singular value, millimetres a deviation.
+    pub smallest_singular_mm: f64,
+    /// `σ_min² / σ_max`, the noise amplification index (A. Nahvi and J. M. Hollerbach, IEEE ICRA 1996); the larger the better.
+    pub noise_amplification_index_mm: f64,
+    /// RMS error of the tool over the workspace that independent noise of the lengths leaves, as a multiple of that noise.
+    pub amplification: f64,
+}
+
+/// Which parameters a set of poses tells, and how independently.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expectation {
+    /// Parameters that can be told.
+    pub rank: usize,
+    /// The most that the chain has (eq. 1).
+    pub independent: usize,
+    /// Largest over smallest singular value of the identified columns, scaled to unit norm, as `host-cal rank` and `fit` have it.
+    pub condition: f64,
+    /// Indices of an independent subset, ascending.
+    pub identified: Vec<usize>,
+}
+
+impl Expectation {
+    /// Judges poses by the chain's Jacobian there.
+    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits]) -> Self {
+        let found = Identifiability::new(chain, measurements, limits, &[]);
+        let identified = found.identified();
+        let jacobian = Observation::new(chain, measurements).jacobian;
+        Self {
+            rank: found.spectrum.rank,
+            independent: chain.independent_parameters(),
+            condition: Spectrum::of_columns(&jacobian, &identified).condition(),
+            identified,
+        }
+    }
+}
+
+impl Quality {
+    /// Judges poses over a subset of the parameters; `None` when they do not tell all of it.
+    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], subset: &[usize]) -> Option<Self> {
+        const MM: f64 = 1e3;
+        let kinematics = Kinematics::new(chain);
+        let mut normal = NormalEquations::new(FreeParameters::from_indices(subset.iter().copied()).ok()?);
+        let mut row = [0.0; MAX_PARAMETERS];
+        for measurement in measurements {
+            kinematics.residual_row(measurement, &mut row);
+            normal.add(&row, 0.0, 1.0);
+        }
+        let scales: Vec<f64> =
+            subset.iter().map(|&index| MM * plausible_deviation(chain.unit(Parameter::from_index(index)))).collect();
+        let count = subset.len();
+        let information = DMatrix::from_fn(count, count, |i, j| scales[i] * scales[j] * normal.entry(i, j).unwrap_or_default());
+        let eigen = information.symmetric_eigen();
+        let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
+        // Below this an eigenvalue of JᵀJ is rounding.
+        if count == 0 || least <= 1e-13 * most {
+            return None;
+        }
+        let log10_determinant = eigen.eigenvalues.iter().map(|value| value.log10()).sum::<f64>();
+        let covariance = {
+            let inverse = DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| 1.0 / value));
+            &eigen.eigenvectors * inverse * eigen.eigenvectors.transpose()
+        };
+        let poses = measurements.len();
+        Some(Self {
+            poses,
+            parameters: count,
+            log10_determinant,
+            mean_sensitivity_mm: 10.0_f64.powf(log10_determinant / (2.0 * count as f64)) / (poses as f64).sqrt(),
+            condition: (most / least).sqrt(),
+            smallest_singular_mm: least.sqrt(),
+            noise_amplification_index_mm: least / most.sqrt(),
+            amplification: amplification(chain, limits, subset, &scales, &covariance),
+        })
+    }
+}
+
+/// `√(mean trace(P C Pᵀ))` over random poses, `P` the tool's position by the scaled parameters.
+fn amplification(chain: &Chain<f64>, limits: &[JointLimits], subset: &[usize], scales: &[f64], covariance: &DMatrix<f64>) -> f64 {
+    const POSES: usize = 200;
+    let kinematics = Kinematics::new(chain);
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut row = [0.0; MAX_PARAMETERS];
+    let mut sum = 0.0;
+    for _ in 0..POSES {
+        let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
+        let Ok(q) = chain.joint_vector(&q) else { continue };
+        let origin_m = kinematics.base_from_tool(&q).translation_m;
+        for axis in 0..3 {
+            let force = Vector3::ith(axis, 1.0);
+            kinematics.wrench_columns(&q, force, origin_m.cross(&force), &mut row);
+            let column = DVector::from_iterator(subset.len(), subset.iter().zip(scales).map(|(&i, scale)| row[i] * scale));
+            sum += column.dot(&(covariance * &column));
+        }
+    }
+    (sum / POSES as f64).sqrt()
+}
