@@ -122,9 +122,8 @@ impl PlanArgs {
             seed: self.seed,
         };
         let start = Instant::now();
-        let poses = options.pairings.len() * options.bars_m.len() * options.poses_per_shell;
-        let bar = progress(poses as u64, "planning poses and ways");
-        let plan = plan(robot, rig, &options, &|| bar.inc(1));
+        let bar = progress(options.ticks() as u64, "planning poses and ways");
+        let plan = plan(robot, rig, &options, &|count| bar.inc(count as u64));
         bar.finish_and_clear();
         let plan = plan?;
         let planning_s = start.elapsed().as_secs_f64();

@@ -10,7 +10,7 @@ pub(super) struct Experience {
 }
 
 /// Noise of a length, metres: of the paper's order (0.084 mm). Only its ratio to plausible deviations matters here.
-const NOISE_M: f64 = 1e-4;
+pub(super) const NOISE_M: f64 = 1e-4;
 
 impl Experience {
     pub(super) fn new(parameters: usize) -> Self {

@@ -17,8 +17,17 @@ use super::way;
 const POSTURES: usize = 16;
 /// Of the postures at a crossing so many are tried, the most telling first, before it is put off.
 const FIRST_CHOICES: usize = 4;
+/// Of a later family so many are tried, those nearest to it.
+const NEAREST_CHOICES: usize = 8;
 /// Neighbours to which a way is tried from a new posture.
 const NEIGHBOURS: usize = 3;
+/// Families of postures that are looked for: with the elbow above and below, the arm to the left and to the right.
+pub(super) const FAMILIES: usize = 3;
+/// A later family that reaches fewer than this share of the first one's crossings is given up.
+const SHARE_OF_FIRST: f64 = 0.3;
+/// Beginnings of later families that are tried.
+const BEGINNINGS: usize = 5;
+
 /// How many poses a shell should have.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wanted {
@@ -28,36 +37,41 @@ pub(super) struct Wanted {
     pub(super) per_crossing: usize,
 }
 
-impl ShellRoads {
-    /// Chooses postures. Where part of the grid is not reached, longitudes between the others make up for it.
-    ///
-    /// Of a crossing's postures the one is taken that tells most beyond those taken so far. It has to be joined to them by a way; a
-    /// posture that is not starts an island, and only the largest island counts in the end. `tick` is called for each crossing with a
-    /// posture.
-    pub(super) fn new(cell: &Cell<'_>, shell: Shell, grid: &Grid, wanted: Wanted, rng: &mut ChaCha8Rng, tick: &dyn Fn()) -> Self {
-        let roads = Self { shell, hindrances: BTreeMap::new(), nodes: Vec::new(), ways: BTreeMap::new(), crossings: Vec::new() };
-        let experience = Experience::new(cell.robot.chain.parameter_count());
-        let mut growth = Growth { cell, roads, islands: Islands::default(), experience, choices: Vec::new(), tick };
-        for crossing in grid.crossings() {
-            growth.grow(crossing, rng);
+/// Families of postures on a shell, the largest first. Ways join those of a family with one another; none was found from family to
+/// family.
+///
+/// Where part of the grid is not reached, longitudes between the others make up for it. `tick` is called with numbers that add up to
+/// [`FAMILIES`] times the crossings wanted.
+pub(super) fn families(
+    cell: &Cell<'_>,
+    shell: Shell,
+    grid: &Grid,
+    wanted: Wanted,
+    rng: &mut ChaCha8Rng,
+    tick: &dyn Fn(usize),
+) -> Vec<ShellRoads> {
+    let mut first = Growth::new(cell, shell, wanted, tick);
+    first.grow_all(grid, rng);
+    let least = (SHARE_OF_FIRST * first.reached() as f64).ceil() as usize;
+    let mut grown = vec![first];
+    for start in grown[0].strangers(BEGINNINGS) {
+        let is_known = |family: &Growth<'_, '_>| family.neighbour(&start, |island| island == family.home()).is_some();
+        if grown.len() == FAMILIES || grown.iter().any(is_known) {
+            continue;
         }
-        growth.join_islands();
-        growth.join_put_off(wanted.per_crossing);
-        for mut between in grid.between() {
-            between.shuffle(rng);
-            for crossing in between {
-                if growth.reached() >= wanted.crossings {
-                    break;
-                }
-                growth.grow(crossing, rng);
-            }
+        let mut growth = Growth::new(cell, shell, wanted, tick);
+        growth.begin(start);
+        growth.grow_all(grid, rng);
+        if growth.reached() >= least {
+            grown.push(growth);
         }
-        growth.join_put_off(wanted.per_crossing);
-        let largest = growth.islands.largest();
-        let islands = growth.islands;
-        growth.roads.keep(|node| islands.of[node] == largest);
-        growth.roads
     }
+    for growth in &mut grown {
+        growth.fill(grid, wanted, rng);
+    }
+    let ticked: usize = grown.iter().map(|growth| growth.ticked).sum();
+    tick((FAMILIES * wanted.crossings).saturating_sub(ticked));
+    grown.into_iter().map(Growth::harvest).collect()
 }
 
 /// A shell's postures, being chosen.
@@ -65,18 +79,107 @@ struct Growth<'a, 'c> {
     cell: &'a Cell<'c>,
     roads: ShellRoads,
     islands: Islands,
+    /// The island that counts; the largest when it is not given.
+    home: Option<usize>,
     experience: Experience,
     /// Of each crossing the postures that are not nodes.
     choices: Vec<Vec<Node>>,
-    tick: &'a dyn Fn(),
+    most: usize,
+    ticked: usize,
+    tick: &'a dyn Fn(usize),
 }
 
-impl Growth<'_, '_> {
-    /// Crossings with a posture on the largest island.
+impl<'a, 'c> Growth<'a, 'c> {
+    fn new(cell: &'a Cell<'c>, shell: Shell, wanted: Wanted, tick: &'a dyn Fn(usize)) -> Self {
+        Self {
+            cell,
+            roads: ShellRoads {
+                shell,
+                hindrances: BTreeMap::new(),
+                nodes: Vec::new(),
+                ways: BTreeMap::new(),
+                crossings: Vec::new(),
+            },
+            islands: Islands::default(),
+            home: None,
+            experience: Experience::new(cell.robot.chain.parameter_count()),
+            choices: Vec::new(),
+            most: wanted.crossings,
+            ticked: 0,
+            tick,
+        }
+    }
+
+    fn home(&self) -> usize {
+        self.home.unwrap_or_else(|| self.islands.largest())
+    }
+
+    /// The nodes of the island that counts, and the ways between them.
+    fn harvest(mut self) -> ShellRoads {
+        let (home, islands) = (self.home(), self.islands);
+        self.roads.keep(|node| islands.of[node] == home);
+        self.roads
+    }
+
+    /// Takes the grid in.
+    fn grow_all(&mut self, grid: &Grid, rng: &mut ChaCha8Rng) {
+        for crossing in grid.crossings() {
+            self.grow(crossing, rng);
+        }
+        self.join_islands();
+        self.join_put_off(1);
+    }
+
+    /// Takes crossings between those of the grid in, until there are enough, and more postures at each where more are wanted.
+    fn fill(&mut self, grid: &Grid, wanted: Wanted, rng: &mut ChaCha8Rng) {
+        for mut between in grid.between() {
+            between.shuffle(rng);
+            for crossing in between {
+                if self.reached() >= wanted.crossings {
+                    break;
+                }
+                self.grow(crossing, rng);
+            }
+        }
+        self.join_put_off(wanted.per_crossing);
+    }
+
+    /// Postures that were not taken and are far from the family's: of the farthest fifth those with most others about them.
+    fn strangers(&self, count: usize) -> Vec<Node> {
+        const FARTHEST: f64 = 0.2;
+        const ABOUT_RAD: f64 = 1.0;
+        let home = self.home();
+        let nodes = || self.roads.nodes.iter().zip(&self.islands.of).filter(|(_, island)| **island == home);
+        let far_s = |node: &Node| nodes().map(|(other, _)| self.cell.seconds(&other.q, &node.q)).fold(f64::INFINITY, f64::min);
+        let mut left: Vec<(f64, &Node)> = self.choices.iter().flatten().map(|node| (far_s(node), node)).collect();
+        left.sort_by(|a, b| b.0.total_cmp(&a.0));
+        left.truncate((left.len() as f64 * FARTHEST) as usize);
+        let about_s = ABOUT_RAD / self.cell.pace.turn_rad_s;
+        let is_about = |a: &Node, b: &Node| self.cell.seconds(&a.q, &b.q) < about_s;
+        let mut strangers: Vec<&Node> = Vec::new();
+        for _ in 0..count {
+            let apart = || left.iter().map(|(_, node)| *node).filter(|node| strangers.iter().all(|other| !is_about(other, node)));
+            let Some(next) = apart().max_by_key(|node| left.iter().filter(|(_, other)| is_about(node, other)).count()) else {
+                break;
+            };
+            strangers.push(next);
+        }
+        strangers.into_iter().cloned().collect()
+    }
+
+    /// Starts a later family with a posture of its own.
+    fn begin(&mut self, start: Node) {
+        self.home = Some(0);
+        // Its crossing is counted with the others when they are taken in; here it is the seed that they join.
+        self.roads.nodes.push(Node { crossing: None, ..start });
+        self.islands.of.push(0);
+    }
+
+    /// Crossings with a posture on the island that counts.
     fn reached(&self) -> usize {
-        let largest = self.islands.largest();
-        let nodes = self.roads.nodes.iter().zip(&self.islands.of);
-        nodes.filter(|(_, island)| **island == largest).map(|(node, _)| node.crossing).collect::<BTreeSet<_>>().len()
+        let home = self.home();
+        let nodes = self.roads.nodes.iter().zip(&self.islands.of).filter(|(_, island)| **island == home);
+        nodes.filter_map(|(node, _)| node.crossing).collect::<BTreeSet<_>>().len()
     }
 
     /// Takes a crossing in, with the posture that tells most of those that can be joined.
@@ -88,21 +191,39 @@ impl Growth<'_, '_> {
             self.roads.hindrances.insert(index, found.hindrance());
         }
         let row = |q: &JointVector<f64>| self.cell.plausible_row(q, &self.roads.shell.pairing);
-        let mut nodes: Vec<Node> = found.postures.into_iter().map(|q| Node { crossing: index, row: row(&q), q }).collect();
-        nodes.sort_by(|a, b| self.experience.novelty(&b.row).total_cmp(&self.experience.novelty(&a.row)));
-        if !nodes.is_empty() {
-            let best = nodes.iter().take(FIRST_CHOICES).enumerate();
-            let largest = self.islands.largest();
-            let to_largest = best.clone().find_map(|(at, node)| Some((at, self.neighbour(node, |island| island == largest)?)));
-            let joined = to_largest
-                .or_else(|| best.clone().find_map(|(at, node)| Some((at, self.neighbour(node, |island| island != largest)?))));
-            let node = match joined {
-                Some((at, way)) => self.push(nodes.remove(at), Some(way)),
-                None => self.push(nodes.remove(0), None),
-            };
-            self.experience.add(&self.roads.nodes[node].row);
-        }
+        let mut nodes: Vec<Node> = found.postures.into_iter().map(|q| Node { crossing: Some(index), row: row(&q), q }).collect();
+        let tries = if self.home.is_some() { self.nearest_first(&mut nodes) } else { FIRST_CHOICES.min(nodes.len()) };
+        let novelty = |node: &Node| self.experience.novelty(&node.row);
+        let sortable = if self.home.is_some() { tries } else { nodes.len() };
+        nodes[..sortable].sort_by(|a, b| novelty(b).total_cmp(&novelty(a)));
+
+        let best = || nodes.iter().take(tries).enumerate();
+        let home = self.home();
+        let to_home = best().find_map(|(at, node)| Some((at, self.neighbour(node, |island| island == home)?)));
+        let joined = match (to_home, self.home) {
+            (None, None) => best().find_map(|(at, node)| Some((at, self.neighbour(node, |island| island != home)?))),
+            (to_home, _) => to_home,
+        };
+        let taken = match joined {
+            Some((at, way)) => Some((nodes.remove(at), Some(way))),
+            None if self.home.is_none() && !nodes.is_empty() => Some((nodes.remove(0), None)),
+            None => None,
+        };
         self.choices.push(nodes);
+        if let Some((node, way)) = taken {
+            self.experience.add(&node.row);
+            self.push(node, way);
+        }
+    }
+
+    /// Sorts postures by their nearness to the family; how many of them to try.
+    fn nearest_first(&self, nodes: &mut [Node]) -> usize {
+        let near_s = |node: &Node| {
+            let others = self.roads.nodes.iter().map(|other| self.cell.seconds(&other.q, &node.q));
+            others.fold(f64::INFINITY, f64::min)
+        };
+        nodes.sort_by_cached_key(|node| ordered(near_s(node)));
+        NEAREST_CHOICES.min(nodes.len())
     }
 
     /// Looks for ways from other islands to the largest.
@@ -120,21 +241,26 @@ impl Growth<'_, '_> {
         }
     }
 
-    /// Joins crossings that were put off to the largest island, and more postures where more are wanted.
+    /// Joins crossings that were put off to the island that counts, and more postures where more are wanted.
     fn join_put_off(&mut self, per_crossing: usize) {
-        let largest = self.islands.largest();
+        let home = self.home();
         for index in 0..self.choices.len() {
-            let at_crossing = (0..self.roads.nodes.len()).filter(|&i| self.roads.nodes[i].crossing == index);
-            let mut have = at_crossing.filter(|&i| self.islands.of[i] == largest).count();
+            let at_crossing = (0..self.roads.nodes.len()).filter(|&i| self.roads.nodes[i].crossing == Some(index));
+            let mut have = at_crossing.filter(|&i| self.islands.of[i] == home).count();
+            let is_enough = have == 0 && self.reached() >= self.most;
+            let mut left = Vec::new();
             for node in std::mem::take(&mut self.choices[index]) {
-                if have >= per_crossing {
-                    break;
-                }
-                if let Some(way) = self.neighbour(&node, |island| island == largest) {
-                    self.push(node, Some(way));
-                    have += 1;
+                let joined =
+                    if have < per_crossing && !is_enough { self.neighbour(&node, |island| island == home) } else { None };
+                match joined {
+                    Some(way) => {
+                        self.push(node, Some(way));
+                        have += 1;
+                    }
+                    None => left.push(node),
                 }
             }
+            self.choices[index] = left;
         }
     }
 
@@ -148,11 +274,12 @@ impl Growth<'_, '_> {
         near.find_map(|&(i, _)| Some((i, way::attached(self.cell, &self.roads.shell, &nodes[i].q, &node.q)?)))
     }
 
-    fn push(&mut self, node: Node, joined: Option<(usize, Vec<JointVector<f64>>)>) -> usize {
-        let index = self.roads.nodes.len();
-        if self.roads.nodes.iter().all(|other| other.crossing != node.crossing) {
-            (self.tick)();
+    fn push(&mut self, node: Node, joined: Option<(usize, Vec<JointVector<f64>>)>) {
+        if self.ticked < self.most && self.roads.nodes.iter().all(|other| other.crossing != node.crossing) {
+            self.ticked += 1;
+            (self.tick)(1);
         }
+        let index = self.roads.nodes.len();
         self.roads.nodes.push(node);
         match joined {
             Some((other, vias)) => {
@@ -161,8 +288,12 @@ impl Growth<'_, '_> {
             }
             None => self.islands.of.push(index),
         }
-        index
     }
+}
+
+/// Seconds as a key to sort by: never negative, so that the bits are in order.
+fn ordered(seconds: f64) -> u64 {
+    seconds.to_bits()
 }
 
 fn reversed_if(mut vias: Vec<JointVector<f64>>, is_reversed: bool) -> Vec<JointVector<f64>> {

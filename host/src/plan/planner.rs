@@ -6,13 +6,15 @@ use std::thread;
 
 use ballbar::{JointVector, Measurement, Vector3};
 use miette::Diagnostic;
+use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use super::cell::{Cell, Margins, Pace};
+use super::experience::NOISE_M;
 use super::grid::Grid;
-use super::growth::Wanted;
+use super::growth::{FAMILIES, Wanted, families};
 use super::optimal::d_optimal;
 use super::posture::{Hindrance, Shell};
 use super::quality::{Expectation, Quality};
@@ -43,6 +45,13 @@ pub struct PlanOptions {
     pub pace: Pace,
     /// The same seed gives the same plan.
     pub seed: u64,
+}
+
+impl PlanOptions {
+    /// What planning is counted in, for progress: crossings looked for, in every family of postures.
+    pub fn ticks(&self) -> usize {
+        self.pairings.len() * self.bars_m.len() * self.poses_per_shell * FAMILIES
+    }
 }
 
 /// Why there is no plan.
@@ -142,11 +151,11 @@ pub struct Plan {
     pub is_closed_form: bool,
 }
 
-/// Plans; `tick` is called for each point with a posture, `poses_per_shell` times a shell at most.
+/// Plans; `tick` is called with numbers that add up to [`PlanOptions::ticks`].
 ///
 /// # Errors
 /// [`PlanError`] when fixtures overlap, a shell cannot be reached, or `optimal` asks for what cannot be.
-pub fn plan(robot: &Robot, rig: &Rig, options: &PlanOptions, tick: &(dyn Fn() + Sync)) -> Result<Plan, PlanError> {
+pub fn plan(robot: &Robot, rig: &Rig, options: &PlanOptions, tick: &(dyn Fn(usize) + Sync)) -> Result<Plan, PlanError> {
     let cell = Cell::new(robot, rig, options.travel_m, options.margins, options.pace)?;
     let mut roads = all_roads(&cell, options, tick);
     for road in &roads {
@@ -194,7 +203,7 @@ fn on_all_cores<T: Send>(jobs: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T
     results.into_iter().map(|(_, result)| result).collect()
 }
 
-fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn() + Sync)) -> Vec<ShellRoads> {
+fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn(usize) + Sync)) -> Vec<ShellRoads> {
     /// Postures at each point, for a choice to have a choice.
     const CHOICES_PER_CROSSING: usize = 3;
     let per_crossing = if options.optimal.is_some() { CHOICES_PER_CROSSING } else { 1 };
@@ -204,11 +213,51 @@ fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn() + Sync)) -
         .flat_map(|&bar_m| options.pairings.iter().map(move |&id| (bar_m, id)))
         .map(|(bar_m, id)| Shell { id, pairing: cell.rig.pairing(id), bar_m })
         .collect();
-    on_all_cores(shells.len(), |i| {
+    let all = on_all_cores(shells.len(), |i| {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
         rng.set_stream(i as u64);
-        ShellRoads::new(cell, shells[i], &options.grid, wanted, &mut rng, &|| tick())
-    })
+        families(cell, shells[i], &options.grid, wanted, &mut rng, &|count| tick(count))
+    });
+    most_telling(cell.robot.chain.parameter_count(), all)
+}
+
+/// Of each shell's families the one that tells most beside those of the other shells: the arm stands otherwise on different shells
+/// without the bar's being taken off more often.
+fn most_telling(parameters: usize, all: Vec<Vec<ShellRoads>>) -> Vec<ShellRoads> {
+    const SWEEPS: usize = 5;
+    let information = |roads: &ShellRoads| {
+        let rows = roads.one_per_crossing().into_iter().map(|node| &roads.nodes[node].row[..parameters]);
+        rows.fold(DMatrix::zeros(parameters, parameters), |mut sum, row| {
+            let row = DVector::from_column_slice(row) / NOISE_M;
+            sum.ger(1.0, &row, &row, 1.0);
+            sum
+        })
+    };
+    let each: Vec<Vec<DMatrix<f64>>> = all.iter().map(|families| families.iter().map(information).collect()).collect();
+    let mut chosen = vec![0; all.len()];
+    let first = each.iter().filter_map(|families| families.first());
+    let mut sum = first.fold(DMatrix::identity(parameters, parameters), |sum, one| sum + one);
+    for _ in 0..SWEEPS {
+        let before = chosen.clone();
+        for (shell, families) in each.iter().enumerate().filter(|(_, families)| families.len() > 1) {
+            let others = &sum - &families[chosen[shell]];
+            let told = |family: &DMatrix<f64>| log_determinant(&others + family);
+            let best = (0..families.len()).max_by(|&a, &b| told(&families[a]).total_cmp(&told(&families[b])));
+            chosen[shell] = best.unwrap_or(chosen[shell]);
+            sum = others + &families[chosen[shell]];
+        }
+        if chosen == before {
+            break;
+        }
+    }
+    all.into_iter()
+        .zip(chosen)
+        .filter_map(|(mut families, best)| (best < families.len()).then(|| families.swap_remove(best)))
+        .collect()
+}
+
+fn log_determinant(information: DMatrix<f64>) -> f64 {
+    information.cholesky().map_or(f64::NEG_INFINITY, |factor| factor.l().diagonal().iter().map(|pivot| pivot.ln()).sum())
 }
 
 fn all_tours(cell: &Cell<'_>, roads: &mut Vec<ShellRoads>, chosen: &[Vec<usize>]) -> Vec<Vec<Stop>> {
@@ -236,8 +285,9 @@ fn choose(
     grid: &[Vec<usize>],
     wanted: usize,
 ) -> Result<(Vec<Vec<usize>>, Comparison), PlanError> {
-    let pool: Vec<(usize, usize)> =
-        roads.iter().enumerate().flat_map(|(shell, road)| (0..road.nodes.len()).map(move |node| (shell, node))).collect();
+    let is_measurable = |&(shell, node): &(usize, usize)| roads[shell].nodes[node].crossing.is_some();
+    let nodes = roads.iter().enumerate().flat_map(|(shell, road)| (0..road.nodes.len()).map(move |node| (shell, node)));
+    let pool: Vec<(usize, usize)> = nodes.filter(is_measurable).collect();
     if wanted > pool.len() {
         return Err(PlanError::TooFewToChoose { wanted, found: pool.len() });
     }

@@ -14,7 +14,8 @@ use super::way;
 /// A posture at a crossing.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
-    pub(super) crossing: usize,
+    /// Its crossing's index; `None` for the posture that a family begins with, which is not measured.
+    pub(super) crossing: Option<usize>,
     pub(super) q: JointVector<f64>,
     /// Gradient of its length times plausible deviations, metres.
     pub(super) row: Vec<f64>,
@@ -60,7 +61,7 @@ impl ShellRoads {
         self.ways = ways.filter_map(|((a, b), way)| Some(((new_index[a]?, new_index[b]?), way))).collect();
         self.nodes = kept;
         for index in 0..self.crossings.len() {
-            if self.nodes.iter().all(|node| node.crossing != index) {
+            if self.nodes.iter().all(|node| node.crossing != Some(index)) {
                 self.hindrances.entry(index).or_insert(Hindrance::NoWay);
             }
         }
@@ -68,7 +69,10 @@ impl ShellRoads {
 
     /// For each crossing that was reached the node that was taken first.
     pub(super) fn one_per_crossing(&self) -> Vec<usize> {
-        let first = |i: &usize| self.nodes[..*i].iter().all(|node| node.crossing != self.nodes[*i].crossing);
+        let first = |i: &usize| {
+            let crossing = self.nodes[*i].crossing;
+            crossing.is_some() && self.nodes[..*i].iter().all(|node| node.crossing != crossing)
+        };
         (0..self.nodes.len()).filter(first).collect()
     }
 
