@@ -218,7 +218,30 @@ fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn(usize) + Syn
         rng.set_stream(i as u64);
         families(cell, shells[i], &options.grid, wanted, &mut rng, &|count| tick(count))
     });
-    most_telling(cell.robot.chain.parameter_count(), all)
+    most_telling(cell.robot.chain.parameter_count(), in_one_piece(cell, all, options.seed))
+}
+
+/// Without the families that the arm cannot come to from most others even with the bar off, where a shell has another: they lie in
+/// pockets that it cannot have come into.
+fn in_one_piece(cell: &Cell<'_>, all: Vec<Vec<ShellRoads>>, seed: u64) -> Vec<Vec<ShellRoads>> {
+    let mut pieces: Vec<(JointVector<f64>, usize)> = Vec::new();
+    let mut piece_of = |roads: &ShellRoads| -> Option<usize> {
+        let first = roads.nodes.first()?.q;
+        let is_joined = |(other, _): &(JointVector<f64>, usize)| transfer::free(cell, other, &first, seed).is_some();
+        let piece = pieces.iter().position(is_joined).unwrap_or_else(|| {
+            pieces.push((first, 0));
+            pieces.len() - 1
+        });
+        pieces[piece].1 += 1;
+        Some(piece)
+    };
+    let of: Vec<Vec<Option<usize>>> = all.iter().map(|families| families.iter().map(&mut piece_of).collect()).collect();
+    let largest = (0..pieces.len()).rev().max_by_key(|&piece| pieces[piece].1);
+    let keep = |(families, of): (Vec<ShellRoads>, Vec<Option<usize>>)| -> Vec<ShellRoads> {
+        let has_other = of.contains(&largest);
+        families.into_iter().zip(of).filter(|(_, piece)| !has_other || *piece == largest).map(|(roads, _)| roads).collect()
+    };
+    all.into_iter().zip(of).map(keep).collect()
 }
 
 /// Of each shell's families the one that tells most beside those of the other shells: the arm stands otherwise on different shells
@@ -340,7 +363,10 @@ fn assemble(cell: &Cell<'_>, roads: &[ShellRoads], grid: &[Vec<usize>], tours: V
         {
             stops.reverse();
         }
-        let approach = last.zip(stops.first()).map(|(last, (_, first))| transfer::free(cell, &last, first, seed));
+        let approach = last.map(|last| {
+            let mut poses: Vec<&mut JointVector<f64>> = stops.iter_mut().map(|(_, q)| q).collect();
+            transfer::approach(cell, &last, &mut poses, seed)
+        });
         let free = approach.clone().flatten().unwrap_or_default();
         rows.extend(free.iter().map(|q| row(cell, &road.shell, RowKind::Via, q, false)));
         let measured = stops.iter().filter(|(kind, _)| *kind == RowKind::Measure);
