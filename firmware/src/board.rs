@@ -4,7 +4,7 @@ use ballbar::wire::{
     BoardHello, FrameReader, MAX_FRAME, PROTOCOL, Refusal, Reply, ResetReason, ToBoard, ToHost, decode, encode, hello_version,
 };
 use embedded_hal::digital::OutputPin;
-use embedded_io::{Read, ReadReady};
+use embedded_io::{Read, ReadReady, Write};
 use heapless::String;
 use heapless::spsc::Consumer;
 
@@ -66,9 +66,7 @@ impl<'q, H: Hardware> Board<'q, H> {
 
     /// One round of the main loop; never blocks. To be called after every sampling interrupt, and after bytes from the link.
     pub fn poll(&mut self) {
-        while let Some(latched) = self.queue.dequeue() {
-            self.take_sample(&latched);
-        }
+        self.take_samples();
         self.read_link();
         self.outbox.drain(self.hardware.link());
         self.reset_when_due();
@@ -77,6 +75,14 @@ impl<'q, H: Hardware> Board<'q, H> {
     /// The hardware, for a simulation that moves it between rounds.
     pub fn hardware_mut(&mut self) -> &mut H {
         &mut self.hardware
+    }
+
+    /// As many as the queue holds at most: a main loop that is always behind must still come to the link.
+    fn take_samples(&mut self) {
+        for _ in 0..self.queue.capacity() {
+            let Some(latched) = self.queue.dequeue() else { return };
+            self.take_sample(&latched);
+        }
     }
 
     fn take_sample(&mut self, latched: &LatchedSample) {
@@ -105,6 +111,8 @@ impl<'q, H: Hardware> Board<'q, H> {
             for &byte in &bytes[..count] {
                 self.take_byte(byte);
             }
+            // A row of requests without an end does not keep the samples waiting.
+            self.take_samples();
         }
     }
 
@@ -159,6 +167,8 @@ impl<'q, H: Hardware> Board<'q, H> {
     fn reset_when_due(&mut self) {
         if self.reset_at_us.is_some_and(|at_us| self.uptime_us() >= at_us) && self.outbox.is_empty() {
             self.reset_at_us = None;
+            // The answer may still be on its way behind the outbox.
+            let _ = self.hardware.link().flush();
             self.hardware.reset();
         }
     }

@@ -35,8 +35,9 @@ impl Conversation {
         *self = Self { is_open: is_same_version, missing: self.missing, ..Self::default() };
     }
 
-    /// Counts the requests that are missing before this one.
+    /// Counts the requests that are missing before this one, and forgets the last action when this is no repetition of it.
     fn count(&mut self, id: u16) {
+        self.last_action = self.last_action.filter(|&(last, _)| last == id);
         if let Some(last) = self.last_id.replace(id) {
             let ahead = id.wrapping_sub(last);
             // Half of the circle is behind: a repetition, or a host that began anew.
@@ -109,6 +110,8 @@ impl<H: Hardware> Board<'_, H> {
                 Ok(())
             }
             Command::Reset => {
+                // A link that is full of the stream would never let the answer out.
+                self.streamer.stop(&self.sensors, &mut self.outbox);
                 self.reset_at_us = Some(self.uptime_us() + RESET_DELAY_US);
                 Ok(())
             }
@@ -167,9 +170,17 @@ impl<H: Hardware> Board<'_, H> {
         }
         // Poses gathered so far belong to the old parameters.
         self.streamer.flush(&self.sensors, &mut self.outbox);
-        self.parameters.commit(crc, self.hardware.flash())?;
+        let old_encoders = self.parameters.active().map(|active| active.encoders.clone());
+        let committed = self.parameters.commit(crc, self.hardware.flash());
+        if H::Flash::STALLS_SAMPLING {
+            self.sensors.interrupted();
+        }
+        committed?;
         if let Some(active) = self.parameters.active() {
             self.sensors.configure(active.encoders.encoders());
+            if old_encoders.is_some_and(|old| old != active.encoders) {
+                self.sensors.forget_homing();
+            }
         }
         Ok(())
     }

@@ -63,11 +63,15 @@ impl Parameters {
 
     /// The set itself; that in use is read from flash, so that the answer is what is stored.
     pub(crate) fn read(&self, which: WhichSet, flash: &mut impl ParameterFlash) -> Result<ParameterSet, Refusal> {
-        match which {
-            WhichSet::Active => self.active.as_ref().and_then(|_| Slots::load(flash).1),
-            WhichSet::Staged => self.staged.as_ref().map(|staged| staged.set.clone()),
+        match (which, &self.active, &self.staged) {
+            (WhichSet::Active, Some(active), _) => {
+                // A slot that has rotted since gives the set before, which is not the one in use.
+                let stored = Slots::load(flash).1.filter(|set| set_crc(set) == Some(active.identity.crc));
+                stored.ok_or(Refusal::Flash)
+            }
+            (WhichSet::Staged, _, Some(staged)) => Ok(staged.set.clone()),
+            _ => Err(Refusal::NoParameters),
         }
-        .ok_or(Refusal::NoParameters)
     }
 
     /// CRC-32 of what the flash holds now.

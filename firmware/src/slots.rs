@@ -84,11 +84,14 @@ impl Slots {
     /// # Errors
     /// [`CommitError`]; the newest set before is the newest still.
     pub fn commit(&mut self, flash: &mut impl ParameterFlash, set: &ParameterSet) -> Result<(), CommitError> {
+        // As they are now: a slot that was good at start may have rotted since, and the other one is then not to be erased.
+        self.states = [read_slot(flash, 0).0, read_slot(flash, 1).0];
         let sequence = self.active().map_or(0, |(sequence, _)| sequence.wrapping_add(1));
         let oldest = self.newest().map_or(0, |newest| 1 - newest);
         self.write(flash, oldest, sequence, set)?;
         if !matches!(self.states[1 - oldest], SlotState::Good { .. }) {
-            self.write(flash, 1 - oldest, sequence, set)?;
+            // The set is stored already; without its copy, the slots' states say so.
+            let _ = self.write(flash, 1 - oldest, sequence, set);
         }
         Ok(())
     }

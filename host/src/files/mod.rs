@@ -19,4 +19,4 @@ pub use problem::Problem;
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{Calibration, EncoderFacts, JointLimits, NoEncoders, Robot};
 pub use source::{InputError, Source};
-pub use write::{WriteError, write_atomically};
+pub use write::{WriteError, write_atomically, write_atomically_with};
