@@ -1,7 +1,7 @@
 //! The slow side: what the main loop does.
 
 use ballbar::wire::{
-    BoardHello, FrameReader, MAX_FRAME, PROTOCOL, Refusal, Reply, ResetReason, ToBoard, ToHost, decode, encode, hello_version,
+    BoardHello, FrameReader, MAX_FRAME, PROTOCOL, ResetReason, ToBoard, ToHost, decode, encode, hello_version,
 };
 use embedded_hal::digital::OutputPin;
 use embedded_io::{Read, ReadReady, Write};
@@ -127,7 +127,7 @@ impl<'q, H: Hardware> Board<'q, H> {
         }
         let reply = match decode(payload) {
             Some(ToBoard::Request(request)) => self.request(&request),
-            _ => Reply { id: Conversation::id_of(payload), outcome: Err(Refusal::NotUnderstood) },
+            _ => self.conversation.not_understood(payload),
         };
         self.answer(&ToHost::Reply(reply));
     }

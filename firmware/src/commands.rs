@@ -8,8 +8,8 @@ use heapless::Vec;
 
 use crate::board::Board;
 use crate::hardware::{Hardware, ParameterFlash};
-use crate::parameters::Parameters;
 use crate::self_test::{Findings, self_test};
+use crate::slots::Slots;
 use crate::{ENCODERS, RATE_MAX_HZ, RATE_MIN_HZ};
 
 /// Time between the answer to a reset and the reset, for the answer to leave, microseconds.
@@ -47,12 +47,18 @@ impl Conversation {
         }
     }
 
-    /// The number in a payload that is a request of some version, as far as one can tell; 0 otherwise.
-    pub(crate) fn id_of(payload: &[u8]) -> u16 {
-        match postcard::take_from_bytes::<(u8, u16)>(payload) {
-            Ok(((1, id), _)) => id,
-            _ => 0,
+    /// The answer to a payload that is no message of this version: under its number when it is a request, as far as one can tell,
+    /// and under 0 otherwise.
+    pub(crate) fn not_understood(&mut self, payload: &[u8]) -> Reply {
+        let id = match postcard::take_from_bytes::<(u8, u16)>(payload) {
+            Ok(((1, id), _)) => Some(id),
+            _ => None,
+        };
+        // It came, so it is not missing.
+        if let Some(id) = id.filter(|_| self.is_open) {
+            self.count(id);
         }
+        Reply { id: id.unwrap_or_default(), outcome: Err(Refusal::NotUnderstood) }
     }
 }
 
@@ -242,15 +248,15 @@ impl<H: Hardware> Board<'_, H> {
     }
 
     fn findings(&mut self) -> Findings {
-        let stored_crc = Parameters::stored_crc(self.hardware.flash());
+        let slots = Slots::load(self.hardware.flash()).0;
         Findings {
             has_samples: self.sensors.latest().is_some(),
             overruns: self.sensors.overruns(),
             is_lvdt_good: self.sensors.latest().is_some_and(|sample| !sample.lvdt.saturated),
             index_errors: self.sensors.index_errors(),
             active_crc: self.parameters.identity().map(|identity| identity.crc),
-            stored_crc,
-            slots: self.parameters.slots(),
+            stored_crc: slots.active().map(|(_, crc)| crc),
+            slots: slots.states(),
             stack_unused_bytes: self.hardware.stack_unused_bytes(),
         }
     }

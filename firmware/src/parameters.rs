@@ -74,11 +74,6 @@ impl Parameters {
         }
     }
 
-    /// CRC-32 of what the flash holds now.
-    pub(crate) fn stored_crc(flash: &mut impl ParameterFlash) -> Option<u32> {
-        Slots::load(flash).0.active().map(|(_, crc)| crc)
-    }
-
     pub(crate) fn stage(&mut self, set: ParameterSet) -> Result<u32, Refusal> {
         let staged = Staged::check(set)?;
         let crc = staged.crc;

@@ -17,8 +17,10 @@ pub(crate) struct Sensors {
     index_checks: [IndexCheck; ENCODERS],
     detector: SettleDetector,
     latest: Option<Sample>,
-    /// Where the encoders stood when one of them last moved by more than its flicker, and when; none before it did.
-    moved: Option<(Counts, u64)>,
+    /// Where the encoders stood at the start, or when one of them last moved by more than its flicker.
+    stand: Option<Counts>,
+    /// When that was; none before one did.
+    moved_at_us: Option<u64>,
     overruns: u32,
     lvdt_faults: u32,
 }
@@ -31,7 +33,8 @@ impl Sensors {
             index_checks: [IndexCheck::default(); ENCODERS],
             detector: SettleDetector::new(StillnessCriteria::default()),
             latest: None,
-            moved: None,
+            stand: None,
+            moved_at_us: None,
             overruns: 0,
             lvdt_faults: 0,
         }
@@ -53,11 +56,12 @@ impl Sensors {
         }
         if let Some(last) = &self.latest {
             self.overruns = self.overruns.wrapping_add(sample.index.wrapping_sub(last.index).wrapping_sub(1));
-            // Compared with where it last stood and not with the sample before, so that a slow joint moves too.
-            let reference = self.moved.as_ref().map_or(&last.counts, |(counts, _)| counts);
-            if sample.counts.iter().zip(reference).any(|(now, before)| now.abs_diff(*before) > FLICKER_COUNTS) {
-                self.moved = Some((sample.counts.clone(), sample.t_us));
-            }
+        }
+        // Compared with where they last stood and not with the sample before, so that a slow joint moves too.
+        let stand = self.stand.get_or_insert_with(|| sample.counts.clone());
+        if sample.counts.iter().zip(&*stand).any(|(now, before)| now.abs_diff(*before) > FLICKER_COUNTS) {
+            *stand = sample.counts.clone();
+            self.moved_at_us = Some(sample.t_us);
         }
         self.lvdt_faults = self.lvdt_faults.wrapping_add(u32::from(sample.lvdt.saturated));
         let settled = self.detector.push(&sample);
@@ -83,7 +87,7 @@ impl Sensors {
         self.index_checks[i].restart();
         self.detector.restart();
         // The jump is no motion.
-        if let Some(place) = self.moved.as_mut().and_then(|(reference, _)| reference.get_mut(i)) {
+        if let Some(place) = self.stand.as_mut().and_then(|stand| stand.get_mut(i)) {
             *place = counts;
         }
         true
@@ -134,8 +138,7 @@ impl Sensors {
 
     /// Whether an encoder moved within the last `within_us` microseconds.
     pub(crate) fn moved(&self, within_us: u64) -> bool {
-        let moved_at_us = self.moved.as_ref().map(|&(_, at_us)| at_us);
-        self.latest.as_ref().zip(moved_at_us).is_some_and(|(latest, at_us)| latest.t_us.saturating_sub(at_us) < within_us)
+        self.latest.as_ref().zip(self.moved_at_us).is_some_and(|(latest, at_us)| latest.t_us.saturating_sub(at_us) < within_us)
     }
 
     pub(crate) fn encoder_status(&self) -> Vec<EncoderStatus, { ballbar::MAX_JOINTS }> {
