@@ -1,8 +1,6 @@
 //! The slow side: what the main loop does.
 
-use ballbar::wire::{
-    BoardHello, FrameReader, MAX_FRAME, PROTOCOL, ResetReason, ToBoard, ToHost, decode, encode, hello_version,
-};
+use ballbar::wire::{BoardHello, FrameReader, MAX_FRAME, PROTOCOL, ResetReason, ToBoard, ToHost, decode, encode, hello_version};
 use embedded_hal::digital::OutputPin;
 use embedded_io::{Read, ReadReady, Write};
 use heapless::String;

@@ -95,7 +95,8 @@ pub fn greets_the_host(bench: &dyn Bench) {
     assert_eq!(status["started_by"], "power-on");
     assert_eq!(status["robot"], Value::Null);
     assert_eq!(status["rate_hz"], 1000);
-    let failed: Vec<&Value> = status["self_test"].as_array().expect("a list").iter().filter(|test| test["passed"] == false).collect();
+    let failed: Vec<&Value> =
+        status["self_test"].as_array().expect("a list").iter().filter(|test| test["passed"] == false).collect();
     assert!(failed.len() <= 3, "parameters, slots, and the LVDT without its bar: {failed:?}");
 }
 
@@ -187,8 +188,7 @@ pub fn record(bench: &dyn Bench, poses: usize, more: &[&str]) -> (Run, Recording
     args.extend(["--rig", RIG, "--pairing", PAIRING, "--bar", &bar, "--band-counts", "1", "--band-codes", "24"]);
     args.extend(more);
     let run = host_cal_run(bench, "stream", &args);
-    let mut recording =
-        Recording { report: run.json(), samples: Vec::new(), settled: Vec::new(), poses: Vec::new(), folder };
+    let mut recording = Recording { report: run.json(), samples: Vec::new(), settled: Vec::new(), poses: Vec::new(), folder };
     recording.read_log();
     assert_eq!(recording.settled.len(), poses, "not all poses settled in time: {}", recording.report);
     (run, recording)

@@ -1,13 +1,16 @@
 //! The firmware's image on an emulated Cortex-M4F, and the `host-cal` command at the other end of its serial port.
 #![cfg(unix)]
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use ballbar_firmware::ENCODERS;
 use ballbar_tests::emulator::{EmulatedBoard, Tick, is_skipped};
 use ballbar_tests::scenarios::{self, Bench, host_cal, host_cal_run};
 use host_cal::virtual_board::{Plant, Script};
 use serde_json::Value;
 
-struct Emulated(EmulatedBoard);
+/// A board, and the turn to have one: two that run at once on a machine of two cores take longer than one after the other.
+struct Emulated(EmulatedBoard, #[expect(dead_code, reason = "held, not read")] MutexGuard<'static, ()>);
 
 impl Bench for Emulated {
     fn board(&self) -> &'static str {
@@ -29,8 +32,14 @@ impl Bench for Emulated {
 
 /// A board that was just switched on, and a plant as the robot stands at that moment; none when boards are to be skipped.
 fn power_up(seed: u64) -> Option<(Emulated, Plant)> {
+    static TURN: Mutex<()> = Mutex::new(());
+    if is_skipped() {
+        return None;
+    }
+    // A test that failed was the last user of its board all the same.
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let plant = scenarios::plant(seed);
-    (!is_skipped()).then(|| (Emulated(EmulatedBoard::start(plant.clone())), plant))
+    Some((Emulated(EmulatedBoard::start(plant.clone()), turn), plant))
 }
 
 /// One board through its life: greeted, given parameters, reset, streaming a minute at 1 kHz, streaming over a bad line, and led

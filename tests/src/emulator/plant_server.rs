@@ -61,7 +61,8 @@ impl PlantServer {
         socket.set_read_timeout(Some(LOOK)).expect("a socket takes a time limit");
         let desk = Desk { plant, waiting: None, answers_nonsense: false, starts: 0, ticks: Vec::new() };
         let shared = Arc::new(Shared { desk: Mutex::new(desk), is_stopped: AtomicBool::new(false) });
-        let server = Server { socket, shared: Arc::clone(&shared), line, writer: RecordWriter::default(), now_us: 0, started_us: 0 };
+        let server =
+            Server { socket, shared: Arc::clone(&shared), line, writer: RecordWriter::default(), now_us: 0, started_us: 0 };
         Self { shared, thread: Some(std::thread::spawn(move || server.serve())) }
     }
 

@@ -65,16 +65,17 @@ fn push_number(bytes: &mut Vec<u8>, number: i32) {
     bytes.push(zigzag as u8);
 }
 
+/// The firmware's reader, as it runs on the board.
+#[cfg(test)]
+#[path = "../../../firmware/src/bin/an386/record.rs"]
+mod reader;
+
 #[cfg(test)]
 mod tests {
     use ballbar_firmware::{EncoderBank, EncoderLatch, LvdtScan};
     use proptest::prelude::*;
 
     use super::*;
-
-    /// The firmware's reader, as it runs on the board.
-    #[path = "../../../../firmware/src/bin/an386/record.rs"]
-    mod reader;
 
     /// Counters as wide as the plant's.
     struct Bank;

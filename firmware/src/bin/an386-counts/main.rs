@@ -15,7 +15,8 @@ use core::hint::black_box;
 use core::panic::PanicInfo;
 
 use ballbar::{
-    Chain, FreeParameters, JointKind, JointVector, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Pairing, Row, Vector3,
+    Chain, FreeParameters, JointKind, JointVector, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Pairing, Row,
+    Vector3,
 };
 use cortex_m_rt::entry;
 use heapless::Vec;
