@@ -26,6 +26,11 @@ struct Staged {
 }
 
 impl Parameters {
+    /// None, before the flash was looked into.
+    pub(crate) fn none() -> Self {
+        Self { slots: Slots::unread(), active: None, staged: None }
+    }
+
     /// Takes into use what the flash holds.
     pub(crate) fn load(flash: &mut impl ParameterFlash) -> Self {
         let (slots, set) = Slots::load(flash);

@@ -53,6 +53,11 @@ pub enum CommitError {
 }
 
 impl Slots {
+    /// Before the flash was looked into.
+    pub(crate) fn unread() -> Self {
+        Self { states: [SlotState::Empty; 2] }
+    }
+
     /// Reads both slots; returns the newest whole set as well.
     pub fn load(flash: &mut impl ParameterFlash) -> (Self, Option<ParameterSet>) {
         let [first, second] = [0, 1].map(|slot| read_slot(flash, slot).unwrap_or((SlotState::Damaged, None)));

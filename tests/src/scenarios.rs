@@ -33,16 +33,12 @@ const CODE_M: f64 = TRAVEL_M / 61_500.0;
 /// For a stream that would otherwise have no end; far longer than any takes.
 const TIME_LIMIT: &str = "5m";
 
-/// A board behind a port, and the plant that it measures.
+/// A board behind a port.
 pub trait Bench {
     /// What its hello calls it.
     fn board(&self) -> &'static str;
     /// The port that a host opens.
     fn port(&self) -> String;
-    /// Plays a script as soon as the board streams.
-    fn play_with_stream(&mut self, script: Script);
-    /// What the plant gave at the ticks since the board's start, where that can be seen: sample i is tick i + 1.
-    fn ticks(&self) -> Option<Vec<Tick>>;
 }
 
 /// A plant of the robot, at rest and without the bar.
@@ -97,7 +93,8 @@ pub fn greets_the_host(bench: &dyn Bench) {
     assert_eq!(status["rate_hz"], 1000);
     let failed: Vec<&Value> =
         status["self_test"].as_array().expect("a list").iter().filter(|test| test["passed"] == false).collect();
-    assert!(failed.len() <= 3, "parameters, slots, and the LVDT without its bar: {failed:?}");
+    let unused = &status["stack_unused_bytes"];
+    assert_eq!(failed.len(), 3, "parameters, slots, and the LVDT without its bar: {failed:?}; {unused} bytes of stack unused");
 }
 
 /// Uploaded parameters are computed with to a micrometre, and stand in flash bit for bit after a reset.

@@ -4,7 +4,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ballbar_firmware::ENCODERS;
-use ballbar_tests::emulator::{EmulatedBoard, Tick, is_skipped};
+use ballbar_tests::emulator::{EmulatedBoard, is_skipped};
 use ballbar_tests::scenarios::{self, Bench, host_cal, host_cal_run};
 use host_cal::virtual_board::{Plant, Script};
 use serde_json::Value;
@@ -19,14 +19,6 @@ impl Bench for Emulated {
 
     fn port(&self) -> String {
         self.0.port().to_owned()
-    }
-
-    fn play_with_stream(&mut self, script: Script) {
-        self.0.play_with_stream(script);
-    }
-
-    fn ticks(&self) -> Option<Vec<Tick>> {
-        Some(self.0.ticks())
     }
 }
 
@@ -46,20 +38,20 @@ fn power_up(seed: u64) -> Option<(Emulated, Plant)> {
 /// astray by its plant.
 #[test]
 fn a_board_serves_its_host() {
-    let Some((mut bench, plant)) = power_up(1) else { return };
+    let Some((bench, plant)) = power_up(1) else { return };
     scenarios::greets_the_host(&bench);
     scenarios::keeps_parameters_over_a_reset(&bench, &plant);
     assert_eq!(bench.0.own_resets(), 1);
     scenarios::home_at_rest(&bench, &plant);
-    streams_a_minute(&mut bench);
-    loses_damaged_frames_only(&mut bench);
+    streams_a_minute(&bench);
+    loses_damaged_frames_only(&bench);
     tells_of_a_panic(&bench);
     tells_of_the_reset_button(&bench);
 }
 
-fn streams_a_minute(bench: &mut Emulated) {
+fn streams_a_minute(bench: &Emulated) {
     let script = scenarios::script(12, 4.5, 3);
-    bench.play_with_stream(script.clone());
+    bench.0.play_with_stream(script.clone());
     let (_, recording) = scenarios::record(bench, script.stations.len(), &["--rate", "1000"]);
     let ticks = bench.0.ticks();
     recording.has_every_sample(60_000);
@@ -69,10 +61,10 @@ fn streams_a_minute(bench: &mut Emulated) {
 }
 
 /// The damaged frames are counted, each of them, and what was in the others arrives.
-fn loses_damaged_frames_only(bench: &mut Emulated) {
+fn loses_damaged_frames_only(bench: &Emulated) {
     const DAMAGED: [usize; 6] = [3, 4, 5, 40, 77, 120];
     let script = scenarios::script(4, 1.3, 5);
-    bench.play_with_stream(script.clone());
+    bench.0.play_with_stream(script.clone());
     bench.0.line().record(&DAMAGED);
     let (run, recording) = scenarios::record(bench, script.stations.len(), &["--rate", "1000"]);
     let streamed = bench.0.line().recorded();
@@ -123,24 +115,24 @@ fn started_by(bench: &Emulated) -> String {
 /// right.
 #[test]
 fn ten_minutes_leave_the_board_as_it_was() {
-    let Some((mut bench, plant)) = power_up(2) else { return };
+    let Some((bench, plant)) = power_up(2) else { return };
     scenarios::make_ready(&bench, &plant);
     let everything = ["--rate", "100", "--pose"];
     let stations = scenarios::script(30, 19.0, 7).stations;
     let (first, rest) = stations.split_at(3);
 
-    let play = |bench: &mut Emulated, stations: &[_]| {
+    let play = |bench: &Emulated, stations: &[_]| {
         let script = Script { stations: stations.to_vec(), ..scenarios::script(0, 1.0, 7) };
-        bench.play_with_stream(script.clone());
+        bench.0.play_with_stream(script.clone());
         let (_, recording) = scenarios::record(bench, stations.len(), &everything);
         recording.has_true_stations(&script);
         recording
     };
-    play(&mut bench, first);
+    play(&bench, first);
     // A status shows the stack as the one before has left it.
     host_cal_run(&bench, "status", &[]);
     let early = host_cal_run(&bench, "status", &[]).json();
-    let recording = play(&mut bench, rest);
+    let recording = play(&bench, rest);
     let late = host_cal_run(&bench, "status", &[]).json();
 
     let ticks = bench.0.ticks();
@@ -152,6 +144,7 @@ fn ten_minutes_leave_the_board_as_it_was() {
     let largest_m = recording.has_true_poses(&ticks);
     println!("largest difference of a tool pose: {:.3} µm", largest_m * 1e6);
 
+    println!("stack never used: {} bytes", late["stack_unused_bytes"]);
     assert_eq!(late["stack_unused_bytes"], early["stack_unused_bytes"]);
     assert!(late["uptime_s"].as_f64().expect("a number") > 600.0);
     // On its way between far stations the bar leaves its travel.

@@ -6,9 +6,8 @@ use std::time::{Duration, Instant};
 
 use ballbar::wire::{BoardHello, MAX_FRAME, PROTOCOL, ProtocolVersion, ResetReason, ToHost, encode};
 use ballbar_tests::command::host_cal_in;
-use ballbar_tests::emulator::Tick;
 use ballbar_tests::scenarios::{self, Bench};
-use host_cal::virtual_board::{Pace, Script, VirtualBoard, VirtualBoardOptions};
+use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions};
 use serialport::{SerialPort, TTYPort};
 
 struct Virtual(VirtualBoard);
@@ -20,14 +19,6 @@ impl Bench for Virtual {
 
     fn port(&self) -> String {
         self.0.port().to_owned()
-    }
-
-    fn play_with_stream(&mut self, script: Script) {
-        self.0.play_with_stream(script);
-    }
-
-    fn ticks(&self) -> Option<Vec<Tick>> {
-        None
     }
 }
 
@@ -41,7 +32,7 @@ fn a_board_serves_its_host() {
     scenarios::home_at_rest(&bench, &plant);
 
     let script = scenarios::script(12, 4.5, 3);
-    bench.play_with_stream(script.clone());
+    bench.0.play_with_stream(script.clone());
     let (_, recording) = scenarios::record(&bench, script.stations.len(), &["--rate", "1000", "--pose"]);
     recording.has_every_sample(60_000);
     recording.has_true_stations(&script);
