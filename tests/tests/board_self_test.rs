@@ -45,7 +45,7 @@ fn each_check_fails_for_its_own_reason() {
                 board.run(2);
             }
         }),
-        (Check::Stack, |board| board.machine().stack_unused_bytes = 5 * 1_024 - 1),
+        (Check::Stack, |board| board.machine().stack_unused_bytes = 6 * 1_024 - 1),
     ];
     for (check, harm) in harms {
         let mut board = puma_board();
