@@ -6,7 +6,7 @@
 #![no_main]
 
 mod board;
-#[path = "../f405/crash.rs"]
+#[path = "../common/crash.rs"]
 mod crash;
 mod pac;
 mod plant_link;
