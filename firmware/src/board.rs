@@ -1,10 +1,8 @@
 //! The slow side: what the main loop does.
 
-use ballbar::wire::{
-    BoardHello, FrameReader, MAX_FRAME, PROTOCOL, Refusal, Reply, ResetReason, ToBoard, ToHost, decode, encode, hello_version,
-};
+use ballbar::wire::{BoardHello, FrameReader, MAX_FRAME, PROTOCOL, ResetReason, ToBoard, ToHost, decode, encode, hello_version};
 use embedded_hal::digital::OutputPin;
-use embedded_io::{Read, ReadReady};
+use embedded_io::{Read, ReadReady, Write};
 use heapless::String;
 use heapless::spsc::Consumer;
 
@@ -29,6 +27,7 @@ pub struct Board<'q, H> {
     pub(crate) conversation: Conversation,
     pub(crate) rate_hz: u16,
     reset_reason: ResetReason,
+    has_loaded: bool,
     /// When a reset that was asked for is due, microseconds since start.
     pub(crate) reset_at_us: Option<u64>,
 }
@@ -40,43 +39,59 @@ const READY_BLINK_US: (u64, u64) = (100_000, 1_000_000);
 const NO_PARAMETERS_BLINK_US: (u64, u64) = (100_000, 250_000);
 
 impl<'q, H: Hardware> Board<'q, H> {
-    /// Takes up the parameters in flash and begins to sample at [`RATE_DEFAULT_HZ`]. `queue` is the other end of the sampler's.
+    /// Begins to sample at [`RATE_DEFAULT_HZ`]; the first round takes up the parameters in flash. `queue` is the other end of the
+    /// sampler's.
     pub fn new(mut hardware: H, queue: Consumer<'q, LatchedSample>, reset_reason: ResetReason) -> Self {
-        let parameters = Parameters::load(hardware.flash());
-        let mut sensors = Sensors::new();
-        if let Some(active) = parameters.active() {
-            sensors.configure(active.encoders.encoders());
-        }
         hardware.set_rate_hz(RATE_DEFAULT_HZ);
         info!("started");
         Self {
             hardware,
             queue,
-            sensors,
+            sensors: Sensors::new(),
             streamer: Streamer::new(),
-            parameters,
+            parameters: Parameters::none(),
             outbox: Outbox::new(),
             frames: FrameReader::new(),
             conversation: Conversation::default(),
             rate_hz: RATE_DEFAULT_HZ,
             reset_reason,
+            has_loaded: false,
             reset_at_us: None,
         }
     }
 
     /// One round of the main loop; never blocks. To be called after every sampling interrupt, and after bytes from the link.
     pub fn poll(&mut self) {
-        while let Some(latched) = self.queue.dequeue() {
-            self.take_sample(&latched);
+        if !self.has_loaded {
+            self.load_parameters();
         }
+        self.take_samples();
         self.read_link();
         self.outbox.drain(self.hardware.link());
         self.reset_when_due();
     }
 
+    /// Not while the board is made: who makes it holds all of it on the stack, and reading flash takes 6 KiB besides.
+    #[inline(never)]
+    fn load_parameters(&mut self) {
+        self.parameters = Parameters::load(self.hardware.flash());
+        if let Some(active) = self.parameters.active() {
+            self.sensors.configure(active.encoders.encoders());
+        }
+        self.has_loaded = true;
+    }
+
     /// The hardware, for a simulation that moves it between rounds.
     pub fn hardware_mut(&mut self) -> &mut H {
         &mut self.hardware
+    }
+
+    /// As many as the queue holds at most: a main loop that is always behind must still come to the link.
+    fn take_samples(&mut self) {
+        for _ in 0..self.queue.capacity() {
+            let Some(latched) = self.queue.dequeue() else { return };
+            self.take_sample(&latched);
+        }
     }
 
     fn take_sample(&mut self, latched: &LatchedSample) {
@@ -105,6 +120,8 @@ impl<'q, H: Hardware> Board<'q, H> {
             for &byte in &bytes[..count] {
                 self.take_byte(byte);
             }
+            // A row of requests without an end does not keep the samples waiting.
+            self.take_samples();
         }
     }
 
@@ -119,7 +136,7 @@ impl<'q, H: Hardware> Board<'q, H> {
         }
         let reply = match decode(payload) {
             Some(ToBoard::Request(request)) => self.request(&request),
-            _ => Reply { id: Conversation::id_of(payload), outcome: Err(Refusal::NotUnderstood) },
+            _ => self.conversation.not_understood(payload),
         };
         self.answer(&ToHost::Reply(reply));
     }
@@ -159,6 +176,8 @@ impl<'q, H: Hardware> Board<'q, H> {
     fn reset_when_due(&mut self) {
         if self.reset_at_us.is_some_and(|at_us| self.uptime_us() >= at_us) && self.outbox.is_empty() {
             self.reset_at_us = None;
+            // The answer may still be on its way behind the outbox.
+            let _ = self.hardware.link().flush();
             self.hardware.reset();
         }
     }

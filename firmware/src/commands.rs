@@ -8,8 +8,8 @@ use heapless::Vec;
 
 use crate::board::Board;
 use crate::hardware::{Hardware, ParameterFlash};
-use crate::parameters::Parameters;
 use crate::self_test::{Findings, self_test};
+use crate::slots::Slots;
 use crate::{ENCODERS, RATE_MAX_HZ, RATE_MIN_HZ};
 
 /// Time between the answer to a reset and the reset, for the answer to leave, microseconds.
@@ -35,8 +35,9 @@ impl Conversation {
         *self = Self { is_open: is_same_version, missing: self.missing, ..Self::default() };
     }
 
-    /// Counts the requests that are missing before this one.
+    /// Counts the requests that are missing before this one, and forgets the last action when this is no repetition of it.
     fn count(&mut self, id: u16) {
+        self.last_action = self.last_action.filter(|&(last, _)| last == id);
         if let Some(last) = self.last_id.replace(id) {
             let ahead = id.wrapping_sub(last);
             // Half of the circle is behind: a repetition, or a host that began anew.
@@ -46,12 +47,18 @@ impl Conversation {
         }
     }
 
-    /// The number in a payload that is a request of some version, as far as one can tell; 0 otherwise.
-    pub(crate) fn id_of(payload: &[u8]) -> u16 {
-        match postcard::take_from_bytes::<(u8, u16)>(payload) {
-            Ok(((1, id), _)) => id,
-            _ => 0,
+    /// The answer to a payload that is no message of this version: under its number when it is a request, as far as one can tell,
+    /// and under 0 otherwise.
+    pub(crate) fn not_understood(&mut self, payload: &[u8]) -> Reply {
+        let id = match postcard::take_from_bytes::<(u8, u16)>(payload) {
+            Ok(((1, id), _)) => Some(id),
+            _ => None,
+        };
+        // It came, so it is not missing.
+        if let Some(id) = id.filter(|_| self.is_open) {
+            self.count(id);
         }
+        Reply { id: id.unwrap_or_default(), outcome: Err(Refusal::NotUnderstood) }
     }
 }
 
@@ -109,6 +116,8 @@ impl<H: Hardware> Board<'_, H> {
                 Ok(())
             }
             Command::Reset => {
+                // A link that is full of the stream would never let the answer out.
+                self.streamer.stop(&self.sensors, &mut self.outbox);
                 self.reset_at_us = Some(self.uptime_us() + RESET_DELAY_US);
                 Ok(())
             }
@@ -167,9 +176,17 @@ impl<H: Hardware> Board<'_, H> {
         }
         // Poses gathered so far belong to the old parameters.
         self.streamer.flush(&self.sensors, &mut self.outbox);
-        self.parameters.commit(crc, self.hardware.flash())?;
+        let old_encoders = self.parameters.active().map(|active| active.encoders.clone());
+        let committed = self.parameters.commit(crc, self.hardware.flash());
+        if H::Flash::STALLS_SAMPLING {
+            self.sensors.interrupted();
+        }
+        committed?;
         if let Some(active) = self.parameters.active() {
             self.sensors.configure(active.encoders.encoders());
+            if old_encoders.is_some_and(|old| old != active.encoders) {
+                self.sensors.forget_homing();
+            }
         }
         Ok(())
     }
@@ -231,15 +248,15 @@ impl<H: Hardware> Board<'_, H> {
     }
 
     fn findings(&mut self) -> Findings {
-        let stored_crc = Parameters::stored_crc(self.hardware.flash());
+        let slots = Slots::load(self.hardware.flash()).0;
         Findings {
             has_samples: self.sensors.latest().is_some(),
             overruns: self.sensors.overruns(),
             is_lvdt_good: self.sensors.latest().is_some_and(|sample| !sample.lvdt.saturated),
             index_errors: self.sensors.index_errors(),
             active_crc: self.parameters.identity().map(|identity| identity.crc),
-            stored_crc,
-            slots: self.parameters.slots(),
+            stored_crc: slots.active().map(|(_, crc)| crc),
+            slots: slots.states(),
             stack_unused_bytes: self.hardware.stack_unused_bytes(),
         }
     }

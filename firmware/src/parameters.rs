@@ -26,6 +26,11 @@ struct Staged {
 }
 
 impl Parameters {
+    /// None, before the flash was looked into.
+    pub(crate) fn none() -> Self {
+        Self { slots: Slots::unread(), active: None, staged: None }
+    }
+
     /// Takes into use what the flash holds.
     pub(crate) fn load(flash: &mut impl ParameterFlash) -> Self {
         let (slots, set) = Slots::load(flash);
@@ -63,16 +68,15 @@ impl Parameters {
 
     /// The set itself; that in use is read from flash, so that the answer is what is stored.
     pub(crate) fn read(&self, which: WhichSet, flash: &mut impl ParameterFlash) -> Result<ParameterSet, Refusal> {
-        match which {
-            WhichSet::Active => self.active.as_ref().and_then(|_| Slots::load(flash).1),
-            WhichSet::Staged => self.staged.as_ref().map(|staged| staged.set.clone()),
+        match (which, &self.active, &self.staged) {
+            (WhichSet::Active, Some(active), _) => {
+                // A slot that has rotted since gives the set before, which is not the one in use.
+                let stored = Slots::load(flash).1.filter(|set| set_crc(set) == Some(active.identity.crc));
+                stored.ok_or(Refusal::Flash)
+            }
+            (WhichSet::Staged, _, Some(staged)) => Ok(staged.set.clone()),
+            _ => Err(Refusal::NoParameters),
         }
-        .ok_or(Refusal::NoParameters)
-    }
-
-    /// CRC-32 of what the flash holds now.
-    pub(crate) fn stored_crc(flash: &mut impl ParameterFlash) -> Option<u32> {
-        Slots::load(flash).0.active().map(|(_, crc)| crc)
     }
 
     pub(crate) fn stage(&mut self, set: ParameterSet) -> Result<u32, Refusal> {

@@ -18,8 +18,8 @@ pub(crate) struct Findings {
     pub(crate) stack_unused_bytes: u32,
 }
 
-/// A quarter of the smallest stack of a board.
-const STACK_SPARE_BYTES: u32 = 2_048;
+/// A quarter of the boards' stacks of 24 KiB.
+const STACK_SPARE_BYTES: u32 = 6 * 1_024;
 
 pub(crate) fn self_test(findings: &Findings) -> SelfTest {
     let is_whole = |slot: &SlotState| matches!(slot, SlotState::Good { .. });

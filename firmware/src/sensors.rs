@@ -1,10 +1,13 @@
 //! What the main loop keeps of every encoder and the LVDT: homing, index checks, losses, and whether the arm stands still.
 
 use ballbar::wire::EncoderStatus;
-use ballbar::{Encoder, IndexCheck, Sample, SettleDetector, SettledPose, StillnessCriteria};
+use ballbar::{Counts, Encoder, IndexCheck, Sample, SettleDetector, SettledPose, StillnessCriteria};
 use heapless::Vec;
 
 use crate::{ENCODERS, LatchedSample};
+
+/// An encoder at rest may flicker by so many counts.
+const FLICKER_COUNTS: u32 = 2;
 
 /// The state of all channels.
 pub(crate) struct Sensors {
@@ -14,8 +17,10 @@ pub(crate) struct Sensors {
     index_checks: [IndexCheck; ENCODERS],
     detector: SettleDetector,
     latest: Option<Sample>,
-    /// Time of the latest sample in which an encoder moved by more than the flicker of one count.
-    moved_at_us: u64,
+    /// Where the encoders stood at the start, or when one of them last moved by more than its flicker.
+    stand: Option<Counts>,
+    /// When that was; none before one did.
+    moved_at_us: Option<u64>,
     overruns: u32,
     lvdt_faults: u32,
 }
@@ -28,7 +33,8 @@ impl Sensors {
             index_checks: [IndexCheck::default(); ENCODERS],
             detector: SettleDetector::new(StillnessCriteria::default()),
             latest: None,
-            moved_at_us: 0,
+            stand: None,
+            moved_at_us: None,
             overruns: 0,
             lvdt_faults: 0,
         }
@@ -50,9 +56,12 @@ impl Sensors {
         }
         if let Some(last) = &self.latest {
             self.overruns = self.overruns.wrapping_add(sample.index.wrapping_sub(last.index).wrapping_sub(1));
-            if sample.counts.iter().zip(&last.counts).any(|(now, before)| now.abs_diff(*before) > 1) {
-                self.moved_at_us = sample.t_us;
-            }
+        }
+        // Compared with where they last stood and not with the sample before, so that a slow joint moves too.
+        let stand = self.stand.get_or_insert_with(|| sample.counts.clone());
+        if sample.counts.iter().zip(&*stand).any(|(now, before)| now.abs_diff(*before) > FLICKER_COUNTS) {
+            *stand = sample.counts.clone();
+            self.moved_at_us = Some(sample.t_us);
         }
         self.lvdt_faults = self.lvdt_faults.wrapping_add(u32::from(sample.lvdt.saturated));
         let settled = self.detector.push(&sample);
@@ -77,14 +86,29 @@ impl Sensors {
         self.homed |= 1 << i;
         self.index_checks[i].restart();
         self.detector.restart();
+        // The jump is no motion.
+        if let Some(place) = self.stand.as_mut().and_then(|stand| stand.get_mut(i)) {
+            *place = counts;
+        }
         true
     }
 
     /// Takes over what the parameters say of the encoders.
     pub(crate) fn configure(&mut self, encoders: &[Encoder<f32>]) {
-        for (check, encoder) in self.index_checks.iter_mut().zip(encoders) {
-            *check = IndexCheck::new(encoder.counts_per_index);
+        let spacings = encoders.iter().map(|encoder| encoder.counts_per_index).chain(core::iter::repeat(0));
+        for (check, counts_per_index) in self.index_checks.iter_mut().zip(spacings) {
+            check.set_counts_per_index(counts_per_index);
         }
+    }
+
+    /// The presets were counted with other encoder facts: they mean nothing any more.
+    pub(crate) fn forget_homing(&mut self) {
+        self.homed = 0;
+    }
+
+    /// Samples are missing that nobody counted: what the arm did meanwhile is not known.
+    pub(crate) fn interrupted(&mut self) {
+        self.detector.restart();
     }
 
     pub(crate) fn set_criteria(&mut self, criteria: StillnessCriteria) {
@@ -114,7 +138,7 @@ impl Sensors {
 
     /// Whether an encoder moved within the last `within_us` microseconds.
     pub(crate) fn moved(&self, within_us: u64) -> bool {
-        self.latest.as_ref().is_some_and(|latest| latest.t_us.saturating_sub(self.moved_at_us) < within_us)
+        self.latest.as_ref().zip(self.moved_at_us).is_some_and(|(latest, at_us)| latest.t_us.saturating_sub(at_us) < within_us)
     }
 
     pub(crate) fn encoder_status(&self) -> Vec<EncoderStatus, { ballbar::MAX_JOINTS }> {

@@ -46,17 +46,21 @@ pub struct Slots {
 pub enum CommitError {
     /// The set does not fit into a slot.
     TooLong,
-    /// The flash could not be erased or written.
+    /// The flash could not be read, erased or written.
     Flash,
     /// What was written reads back as something else.
     ReadBack,
 }
 
 impl Slots {
+    /// Before the flash was looked into.
+    pub(crate) fn unread() -> Self {
+        Self { states: [SlotState::Empty; 2] }
+    }
+
     /// Reads both slots; returns the newest whole set as well.
     pub fn load(flash: &mut impl ParameterFlash) -> (Self, Option<ParameterSet>) {
-        let first = read_slot(flash, 0);
-        let second = read_slot(flash, 1);
+        let [first, second] = [0, 1].map(|slot| read_slot(flash, slot).unwrap_or((SlotState::Damaged, None)));
         let slots = Self { states: [first.0, second.0] };
         let set = match slots.newest() {
             Some(0) => first.1,
@@ -84,11 +88,17 @@ impl Slots {
     /// # Errors
     /// [`CommitError`]; the newest set before is the newest still.
     pub fn commit(&mut self, flash: &mut impl ParameterFlash, set: &ParameterSet) -> Result<(), CommitError> {
+        // As they are now: a slot that was good at start may have rotted since, and the other one is then not to be erased.
+        // One that cannot be read may be the good one.
+        for (slot, state) in self.states.iter_mut().enumerate() {
+            *state = read_slot(flash, slot)?.0;
+        }
         let sequence = self.active().map_or(0, |(sequence, _)| sequence.wrapping_add(1));
         let oldest = self.newest().map_or(0, |newest| 1 - newest);
         self.write(flash, oldest, sequence, set)?;
         if !matches!(self.states[1 - oldest], SlotState::Good { .. }) {
-            self.write(flash, 1 - oldest, sequence, set)?;
+            // The set is stored already; without its copy, the slots' states say so.
+            let _ = self.write(flash, 1 - oldest, sequence, set);
         }
         Ok(())
     }
@@ -115,7 +125,7 @@ impl Slots {
         let length = image_of(sequence, set, &mut image)?;
         self.states[slot] = SlotState::Damaged;
         write_image(flash, slot, &image, length).map_err(|()| CommitError::Flash)?;
-        let (state, stored) = read_slot(flash, slot);
+        let (state, stored) = read_slot(flash, slot)?;
         self.states[slot] = state;
         if stored.as_ref().is_some_and(|stored| is_same(stored, set)) { Ok(()) } else { Err(CommitError::ReadBack) }
     }
@@ -167,19 +177,17 @@ fn write_image<F: ParameterFlash>(flash: &mut F, slot: usize, image: &Image, len
     flash.write(start, &image[..header]).map_err(|_| ())
 }
 
-fn read_slot<F: ParameterFlash>(flash: &mut F, slot: usize) -> (SlotState, Option<ParameterSet>) {
+fn read_slot<F: ParameterFlash>(flash: &mut F, slot: usize) -> Result<(SlotState, Option<ParameterSet>), CommitError> {
     let mut image: Image = [0; SLOT_IMAGE_BYTES];
     let length = SLOT_IMAGE_BYTES.min(F::SLOT_BYTES as usize) / <F as ReadNorFlash>::READ_SIZE * <F as ReadNorFlash>::READ_SIZE;
-    if flash.read(slot as u32 * F::SLOT_BYTES, &mut image[..length]).is_err() {
-        return (SlotState::Damaged, None);
-    }
+    flash.read(slot as u32 * F::SLOT_BYTES, &mut image[..length]).map_err(|_| CommitError::Flash)?;
     if image[..HEADER_BYTES].iter().all(|&byte| byte == 0xff) {
-        return (SlotState::Empty, None);
+        return Ok((SlotState::Empty, None));
     }
-    match parse(&image[..length]) {
+    Ok(match parse(&image[..length]) {
         Some((sequence, crc, set)) => (SlotState::Good { sequence, crc }, Some(set)),
         None => (SlotState::Damaged, None),
-    }
+    })
 }
 
 fn parse(image: &[u8]) -> Option<(u32, u32, ParameterSet)> {

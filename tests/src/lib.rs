@@ -1,6 +1,19 @@
 //! What the tests in `tests/` share.
 
+pub mod any_message;
+#[cfg(unix)]
+pub mod bridge;
 pub mod command;
 pub mod data;
+#[cfg(unix)]
+pub mod emulator;
 pub mod experiment;
+pub mod fake_board;
+pub mod fake_hardware;
 pub mod naive;
+pub mod parameter_sets;
+pub mod power_cut;
+pub mod raw_payload;
+#[cfg(unix)]
+pub mod scenarios;
+pub mod wire_schema;

@@ -2,7 +2,7 @@
 
 use ballbar::{CounterWidth, ExtendedCounter, IndexCheck};
 use ballbar_firmware::{ENCODERS, LatchedSample, LvdtScan, SampleQueue, Sampler};
-use ballbar_tests::fake_board::{FakeAdc, FakeClock, FakeEncoders};
+use ballbar_tests::fake_hardware::{FakeAdc, FakeClock, FakeEncoders};
 use proptest::collection::vec;
 use proptest::prelude::*;
 

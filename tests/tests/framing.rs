@@ -2,6 +2,7 @@
 
 use ballbar::wire::{FrameCounts, FrameFault, FrameReader, MAX_FRAME, MAX_PAYLOAD, ToBoard, ToHost, decode, encode};
 use ballbar_tests::any_message;
+use ballbar_tests::raw_payload::RawPayload;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use rand::{Rng, RngExt, SeedableRng};
@@ -10,18 +11,6 @@ use serde::Serialize;
 
 fn frame_of(message: &impl Serialize) -> Vec<u8> {
     encode(message, &mut [0; MAX_FRAME]).unwrap().to_vec()
-}
-
-/// A payload of bytes as they are: postcard puts nothing around a tuple's parts, so a struct of one slice serialises as the bytes.
-struct Raw<'a>(&'a [u8]);
-
-impl Serialize for Raw<'_> {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        use serde::ser::SerializeTuple;
-        let mut tuple = serializer.serialize_tuple(self.0.len())?;
-        self.0.iter().try_for_each(|byte| tuple.serialize_element(byte))?;
-        tuple.end()
-    }
 }
 
 /// What a reader makes of bytes.
@@ -198,23 +187,30 @@ fn a_frame_too_short_for_its_checksum_is_malformed() {
 fn the_longest_payload_just_fits_and_one_byte_more_does_not() {
     let longest = [b'x'; MAX_PAYLOAD];
     let mut buffer = [0; MAX_FRAME];
-    let frame = encode(&Raw(&longest), &mut buffer).unwrap();
+    let frame = encode(&RawPayload(&longest), &mut buffer).unwrap();
     assert_eq!(frame.len(), MAX_FRAME);
     assert_eq!(read(frame).payloads, [longest]);
-    assert!(encode(&Raw(&[b'x'; MAX_PAYLOAD + 1]), &mut [0; MAX_FRAME]).is_err());
+    assert!(encode(&RawPayload(&[b'x'; MAX_PAYLOAD + 1]), &mut [0; MAX_FRAME]).is_err());
 }
 
 #[test]
-fn a_payload_of_zeros_is_no_longer_than_another() {
+fn the_longest_payload_of_zeros_fits() {
     let mut buffer = [0; MAX_FRAME];
-    let frame = encode(&Raw(&[0; MAX_PAYLOAD]), &mut buffer).unwrap();
-    assert_eq!(read(frame).payloads, [[0; MAX_PAYLOAD]]);
-    assert!(encode(&Raw(&[0; MAX_PAYLOAD + 1]), &mut [0; MAX_FRAME]).is_err());
+    assert_eq!(read(encode(&RawPayload(&[0; MAX_PAYLOAD]), &mut buffer).unwrap()).payloads, [[0; MAX_PAYLOAD]]);
+}
+
+#[test]
+fn a_payload_that_only_fits_because_of_its_zeros_is_read_too() {
+    let mut buffer = [0; MAX_FRAME];
+    let frame = encode(&RawPayload(&[0; MAX_PAYLOAD + 4]), &mut buffer).unwrap();
+    assert_eq!(read(frame).payloads, [[0; MAX_PAYLOAD + 4]]);
+    assert!(encode(&RawPayload(&[0; MAX_PAYLOAD + 6]), &mut [0; MAX_FRAME]).is_err());
 }
 
 #[test]
 fn a_message_with_a_byte_behind_it_is_none() {
-    let mut payload = postcard::to_stdvec(&ToBoard::Hello(ballbar::wire::HostHello { version: ballbar::wire::PROTOCOL })).unwrap();
+    let mut payload =
+        postcard::to_stdvec(&ToBoard::Hello(ballbar::wire::HostHello { version: ballbar::wire::PROTOCOL })).unwrap();
     assert!(decode::<ToBoard>(&payload).is_some());
     payload.push(0);
     assert!(decode::<ToBoard>(&payload).is_none());

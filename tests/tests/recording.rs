@@ -19,6 +19,10 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A board that is homed, holds the design's parameters, and whose robot visits `poses` poses as soon as a host streams.
 fn board(folder: &Path, poses: usize) -> VirtualBoard {
+    board_with(folder, poses, true)
+}
+
+fn board_with(folder: &Path, poses: usize, is_homed: bool) -> VirtualBoard {
     let (truth, design) = (Robot::open("puma560-optimised").unwrap(), Robot::open("puma560").unwrap());
     let rig = Rig::open("triangles").unwrap();
     let pairings = rig.all_pairings();
@@ -37,7 +41,7 @@ fn board(folder: &Path, poses: usize) -> VirtualBoard {
     let plant = Plant::new(&truth, 0.075, 7).unwrap();
     let parameters = Some(parameter_set(&design, plant.lvdt()).unwrap());
     let port_name = Some(folder.join("port"));
-    let options = VirtualBoardOptions { parameters, is_homed: true, port_name, ..VirtualBoardOptions::new(plant, Pace::Real) };
+    let options = VirtualBoardOptions { parameters, is_homed, port_name, ..VirtualBoardOptions::new(plant, Pace::Real) };
     let mut board = VirtualBoard::start(options).unwrap();
     board.play_with_stream(script);
     board
@@ -121,13 +125,14 @@ fn an_unplugged_board_is_waited_for_and_marked_as_a_gap() {
     let folder = TempDir::new().unwrap();
     let (folder, session) = (folder.path(), folder.path().join("s"));
     let first = board(folder, 60);
-    let recording = start(folder, &[&["stream", "port", "--session", "s", "--poses", "3", "--json"], &PAIRING[..]].concat());
+    let recording = start(folder, &[&["stream", "port", "--session", "s", "--poses", "4", "--json"], &PAIRING[..]].concat());
     wait_for("the first pose", || lines_of(&session.join("poses.csv")) >= 2);
     drop(first);
     let _second = board(folder, 60);
     let run = finish(recording);
     assert_eq!(run.code, 1, "a gap is not nothing: {}", run.stderr);
     assert!(run.stderr.contains("port: the board is away: ") && run.stderr.contains("port: the board is back"), "{}", run.stderr);
+    // The second board begins where the first one was: that pose is written once.
     assert_eq!((run.json()["gaps"].as_u64(), run.json()["poses_written"].as_u64()), (Some(1), Some(3)));
     assert_eq!(run.json()["losses"]["lost_on_line"], 0, "what the board did not send is a gap and not a loss");
 
@@ -140,6 +145,74 @@ fn an_unplugged_board_is_waited_for_and_marked_as_a_gap() {
     assert_eq!(table.lines().count() as u64, run.json()["samples"].as_u64().unwrap() + 1);
     let segments: std::collections::BTreeSet<&str> = table.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
     assert_eq!(segments.len(), 2, "two stretches with the gap between them: {segments:?}");
+}
+
+#[test]
+fn a_board_that_comes_back_without_its_homing_adds_no_poses() {
+    let folder = TempDir::new().unwrap();
+    let (folder, session) = (folder.path(), folder.path().join("s"));
+    let first = board(folder, 60);
+    let recording = start(folder, &[&["stream", "port", "--session", "s", "--poses", "3", "--json"], &PAIRING[..]].concat());
+    wait_for("the first pose", || lines_of(&session.join("poses.csv")) >= 2);
+    drop(first);
+    let _second = board_with(folder, 60, false);
+    let run = finish(recording);
+    let (written, withheld) = (run.json()["poses_written"].as_u64().unwrap(), run.json()["poses_withheld"].as_u64().unwrap());
+    assert!(run.code == 1 && withheld >= 1 && written + withheld == 3, "{written} written, {withheld} withheld: {}", run.stderr);
+    assert!(run.stderr.contains("NOT HOMED"), "{}", run.stderr);
+    assert_eq!(lines_of(&session.join("poses.csv")) as u64, written + 1, "counts that begin at zero are no joint angles");
+}
+
+#[test]
+fn an_arm_that_still_stands_after_a_glitch_of_the_cable_is_written_once() {
+    let folder = TempDir::new().unwrap();
+    let (folder, session) = (folder.path(), folder.path().join("s"));
+    // Both boards show the same first pose: to the host it is one arm that stood still while the port was away.
+    let first = board(folder, 1);
+    let recording = start(folder, &[&["stream", "port", "--session", "s", "--poses", "2", "--json"], &PAIRING[..]].concat());
+    wait_for("the first pose", || lines_of(&session.join("poses.csv")) >= 2);
+    drop(first);
+    let _second = board(folder, 1);
+    let run = finish(recording);
+    assert_eq!((run.json()["settled"].as_u64(), run.json()["poses_written"].as_u64()), (Some(2), Some(1)), "{}", run.stderr);
+    assert_eq!(lines_of(&session.join("poses.csv")), 2);
+}
+
+#[test]
+fn a_board_with_other_parameters_ends_the_recording() {
+    let folder = TempDir::new().unwrap();
+    let (folder, session) = (folder.path(), folder.path().join("s"));
+    let first = board(folder, 60);
+    let recording = start(folder, &[&["stream", "port", "--session", "s", "--json"], &PAIRING[..]].concat());
+    wait_for("the first pose", || lines_of(&session.join("poses.csv")) >= 2);
+    drop(first);
+    let plant = Plant::new(&Robot::open("puma560-optimised").unwrap(), 0.075, 7).unwrap();
+    let port_name = Some(folder.join("port"));
+    let _bare = VirtualBoard::start(VirtualBoardOptions { port_name, ..VirtualBoardOptions::new(plant, Pace::Real) }).unwrap();
+    let run = finish(recording);
+    assert!(run.code == 2 && run.stderr.contains("came back with other parameters"), "{} {}", run.code, run.stderr);
+    assert!(run.json()["poses_written"].as_u64() >= Some(1), "and says what was recorded before");
+}
+
+#[test]
+fn a_refused_argument_leaves_no_session() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = board(folder, 60);
+    for bad in [["--rate", "50"], ["--rate", "5001"], ["--hold-ms", "9"], ["--for", "soon"], ["--bar", "-1"]] {
+        let run = host_cal_in(folder, &[&["stream", "port", "--session", "s"], &bad[..]].concat());
+        assert!(run.code == 2 && !folder.join("s").exists(), "{bad:?}: {} {}", run.code, run.stderr);
+    }
+}
+
+#[test]
+fn without_a_pairing_no_pose_is_said_to_be_written() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = board(folder, 60);
+    let run = host_cal_in(folder, &["stream", "port", "--session", "s", "--poses", "1", "--json"]);
+    assert_eq!((run.code, run.json()["settled"].as_u64(), run.json()["poses_written"].as_u64()), (0, Some(1), Some(0)));
+    assert!(run.stderr.contains("not to poses.csv") && !folder.join("s/poses.csv").exists(), "{}", run.stderr);
 }
 
 #[test]

@@ -84,7 +84,7 @@ proptest! {
     /// last left it, and once each.
     #[test]
     fn poses_come_where_a_look_at_all_samples_finds_them(
-        steps in vec((0..12_i32, -1..=1_i32, 0..50_usize), 1..40),
+        steps in vec((0..12_i32, -1..=1_i32, 1..50_usize), 1..40),
         saturated_every in 20..2_000_usize,
         hold_samples in 3..40_u32,
     ) {
@@ -96,36 +96,31 @@ proptest! {
             position += leap * direction;
             for i in 0..stay {
                 let mut sample = arm.sample([position + (i % 3) as i32, -position], 30_000 + (i % 20) as u16);
-                sample.lvdt.saturated = sample.index as usize % saturated_every == 0;
+                sample.lvdt.saturated = (sample.index as usize).is_multiple_of(saturated_every);
                 let found = detector.push(&sample);
 
+                let grown = [&window[..], std::slice::from_ref(&sample)].concat();
                 if sample.lvdt.saturated {
                     (window, is_reported) = (Vec::new(), false);
-                } else {
-                    window.push(sample.clone());
-                    if !is_still(&window, &criteria) {
-                        (window, is_reported) = (vec![sample.clone()], false);
-                    }
+                } else if !is_still(&grown, &criteria) {
+                    (window, is_reported) = (vec![sample.clone()], false);
+                } else if !is_reported {
+                    window = grown;
                 }
-                let is_long = !window.is_empty() && sample.t_us - window[0].t_us >= u64::from(criteria.hold_us);
+                let is_long = window.len() > 1 && sample.t_us - window[0].t_us >= u64::from(criteria.hold_us);
                 prop_assert_eq!(found.is_some(), is_long && !is_reported, "at sample {}", sample.index);
                 if let Some(pose) = found {
                     prop_assert_eq!((pose.index, pose.samples as usize), (window[0].index, window.len()));
                 }
                 is_reported |= is_long;
-                // Once reported, only the samples until then say what the band is.
-                if is_reported && !is_long_enough_to_report(&window, &criteria) {
-                    window.pop();
-                }
             }
         }
     }
 
     #[test]
-    fn a_slow_drift_beyond_the_band_never_settles(counts_per_s in 61..5_000_i32, rate_hz in 100..5_000_u32) {
+    fn a_slow_drift_beyond_the_band_never_settles(counts_per_s in 80..5_000_i32, rate_hz in 100..5_000_u32) {
         let (mut arm, mut detector) = (Arm::at_rate(rate_hz), SettleDetector::new(CRITERIA));
         // Within the hold of 0.1 s the drift is more than the band of 6 counts, and a count of rounding.
-        let counts_per_s = counts_per_s.max(80);
         for i in 0..i64::from(rate_hz) * 3 {
             let drifted = (i * i64::from(counts_per_s) / i64::from(rate_hz)) as i32;
             prop_assert!(detector.push(&arm.sample([drifted, 0], 30_000)).is_none());
@@ -147,16 +142,10 @@ proptest! {
 fn is_still(window: &[Sample], criteria: &StillnessCriteria) -> bool {
     let spread = |channel: &dyn Fn(&Sample) -> i32| {
         let values = || window.iter().map(channel);
-        values().max().unwrap() - values().min().unwrap()
+        values().max().unwrap_or(0) - values().min().unwrap_or(0)
     };
     (0..2).all(|joint| spread(&|sample| sample.counts[joint]) <= i32::from(criteria.band_counts))
         && spread(&|sample| i32::from(sample.lvdt.code)) <= i32::from(criteria.band_codes)
-}
-
-/// Whether the newest sample is the one with which the time is first full.
-fn is_long_enough_to_report(window: &[Sample], criteria: &StillnessCriteria) -> bool {
-    let before = &window[window.len().saturating_sub(2)];
-    before.t_us - window[0].t_us < u64::from(criteria.hold_us)
 }
 
 #[test]
@@ -224,7 +213,6 @@ fn a_restart_brings_the_same_pose_again() {
 }
 
 #[test]
-#[ignore = "bug: a gap of samples counts as standing still, so that two samples half a second apart are a pose"]
 fn a_gap_in_the_samples_starts_the_time_anew() {
     let (mut arm, mut detector) = (Arm::at_rate(1_000), SettleDetector::new(CRITERIA));
     assert_eq!(arm.stand(&mut detector, [0, 0], 1_000).len(), 0);

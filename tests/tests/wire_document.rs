@@ -14,7 +14,7 @@ const CLOSES: &str = "<!-- /schema -->";
 #[test]
 fn a_change_of_the_messages_shows_as_a_change_of_number_and_hash() {
     let hash: String = PROTOCOL.schema.iter().map(|byte| format!("{byte:02x}")).collect();
-    insta::assert_snapshot!(format!("protocol {}, schema {hash}", PROTOCOL.number), @"");
+    insta::assert_snapshot!(format!("protocol {}, schema {hash}", PROTOCOL.number), @"protocol 1, schema a2af9b5c2a8d1e94");
 }
 
 /// `UPDATE_DOCS=1 cargo test -p ballbar-tests --test wire_document` writes the block anew.
@@ -28,7 +28,10 @@ fn the_document_lists_the_messages_as_they_are() {
     if std::env::var_os("UPDATE_DOCS").is_some() {
         std::fs::write(&path, format!("{before}{OPENS}{schema}{CLOSES}{after}")).unwrap();
     } else {
-        assert!(listed == schema, "docs/wire.md is behind the types: run this test with UPDATE_DOCS=1 and look at the difference");
+        assert!(
+            listed == schema,
+            "docs/wire.md is behind the types: run this test with UPDATE_DOCS=1 and look at the difference"
+        );
     }
 }
 

@@ -1,9 +1,9 @@
 //! The longest messages fit into a frame, and the stream of a moving arm into half of the link.
 
 use ballbar::wire::{
-    Answer, BoardHello, Command, EncoderStatus, Event, LinkCounts, MAX_BATCH, MAX_POSE_BATCH, MAX_FRAME, MAX_PAYLOAD, PoseBatch,
-    ProtocolVersion, Reply, Request, ResetReason, SampleBatch, SetIdentity, SlotState, Status, Stream, StreamSelection, StreamedPose,
-    ToBoard, ToHost, ToolPose, encode,
+    Answer, BoardHello, Command, EncoderStatus, Event, LinkCounts, MAX_BATCH, MAX_FRAME, MAX_PAYLOAD, MAX_POSE_BATCH, PoseBatch,
+    ProtocolVersion, Reply, Request, ResetReason, SampleBatch, SetIdentity, SlotState, Status, Stream, StreamSelection,
+    StreamedPose, ToBoard, ToHost, ToolPose, encode,
 };
 use ballbar::{LvdtReading, Sample, SettledPose, Stillness, StillnessCriteria};
 use ballbar_tests::parameter_sets;
@@ -31,8 +31,8 @@ fn worst_batch(encoders: usize) -> SampleBatch {
     let sample = |i: u32| Sample {
         index: u32::MAX - MAX_BATCH as u32 + i,
         t_us: u64::MAX - u64::from((MAX_BATCH as u32 - i) * 65_535),
-        counts: (0..encoders).map(|_| if i % 2 == 0 { i32::MIN } else { 0 }).collect(),
-        lvdt: LvdtReading { code: if i % 2 == 0 { u16::MAX } else { 0 }, saturated: true },
+        counts: (0..encoders).map(|_| if i.is_multiple_of(2) { i32::MIN } else { 0 }).collect(),
+        lvdt: LvdtReading { code: if i.is_multiple_of(2) { u16::MAX } else { 0 }, saturated: true },
     };
     let mut batch = SampleBatch::new(sample(0));
     for i in 1..MAX_BATCH as u32 {
@@ -45,8 +45,11 @@ fn worst_batch(encoders: usize) -> SampleBatch {
 
 #[test]
 fn the_worst_batch_of_samples_of_the_board_fits_into_a_frame() {
-    let bytes = payload_bytes(&streamed(Event::Samples(worst_batch(ballbar_firmware::ENCODERS))));
-    insta::assert_snapshot!(bytes, @"");
+    let message = streamed(Event::Samples(worst_batch(ballbar_firmware::ENCODERS)));
+    insta::assert_snapshot!(payload_bytes(&message), @"791");
+    let mut buffer = [0; MAX_FRAME];
+    let bytes_per_sample = encode(&message, &mut buffer).unwrap().len() as f64 / MAX_BATCH as f64;
+    assert!(bytes_per_sample * 1_000.0 < LINK_BYTES_PER_S / 2.0, "even so it takes less than half of the link at 1 kHz");
 }
 
 #[test]
@@ -60,7 +63,7 @@ fn the_longest_batch_of_poses_fits_into_a_frame() {
     let streamed_pose = StreamedPose { dt_us: u32::MAX, pose, displacement_m: Some(-1.0) };
     let poses = core::iter::repeat_n(streamed_pose, MAX_POSE_BATCH).collect();
     let bytes = payload_bytes(&streamed(Event::Poses(PoseBatch { index: u32::MAX, stride: u16::MAX, t_us: u64::MAX, poses })));
-    insta::assert_snapshot!(bytes, @"");
+    insta::assert_snapshot!(bytes, @"405");
 }
 
 #[test]
@@ -75,14 +78,14 @@ fn the_longest_settled_pose_fits_into_a_frame() {
         code_mean: 1.0,
         code_std: 1.0,
     };
-    insta::assert_snapshot!(payload_bytes(&streamed(Event::Settled(pose))), @"");
+    insta::assert_snapshot!(payload_bytes(&streamed(Event::Settled(pose))), @"153");
 }
 
 #[test]
 fn the_longest_parameters_fit_into_a_frame_in_both_directions() {
     let set = parameter_sets::largest();
     let up = ToBoard::Request(Request { id: u16::MAX, command: Command::WriteParameters(set.clone()) });
-    insta::assert_snapshot!(payload_bytes(&up), @"");
+    insta::assert_snapshot!(payload_bytes(&up), @"481");
     payload_bytes(&reply(Answer::Parameters(set)));
 }
 
@@ -109,7 +112,7 @@ fn the_longest_status_fits_into_a_frame() {
         slots: [SlotState::Good { sequence: u32::MAX, crc: u32::MAX }; 2],
         stack_unused_bytes: u32::MAX,
     };
-    insta::assert_snapshot!(payload_bytes(&reply(Answer::Status(status))), @"");
+    insta::assert_snapshot!(payload_bytes(&reply(Answer::Status(status))), @"292");
 }
 
 #[test]
@@ -128,7 +131,7 @@ fn a_hello_with_the_longest_last_words_fits_into_a_frame() {
         reset: ResetReason::Panic("p".repeat(96).as_str().try_into().unwrap()),
         active: Some(longest_identity()),
     };
-    insta::assert_snapshot!(payload_bytes(&ToHost::Hello(hello)), @"");
+    insta::assert_snapshot!(payload_bytes(&ToHost::Hello(hello)), @"229");
 }
 
 fn longest_identity() -> SetIdentity {
@@ -139,8 +142,8 @@ fn longest_identity() -> SetIdentity {
 /// Bytes a second that the link carries.
 const LINK_BYTES_PER_S: f64 = 92_160.0;
 
-/// Samples of an arm whose joints all move at once, sinusoidally, up to their encoders' fastest rates of the PUMA's data sheet,
-/// some 20,000 counts a second, with the LVDT's code moving and noisy by some twenty.
+/// Samples of an arm whose joints all swing at once by about a radian, at up to 1.6 rad and some 20,000 counts a second, while the
+/// LVDT's code sweeps over its range with eight codes of noise.
 fn moving_arm(rate_hz: u32) -> impl Iterator<Item = Sample> {
     const AMPLITUDES: [f64; 6] = [9_000.0, 13_000.0, 8_000.0, 12_000.0, 11_000.0, 12_000.0];
     (0..60 * rate_hz).map(move |i| {
@@ -184,12 +187,12 @@ fn bytes_per_sample(samples: impl Iterator<Item = Sample>) -> f64 {
 fn the_stream_of_a_moving_arm_at_1_khz_takes_less_than_half_of_the_link() {
     let bytes = bytes_per_sample(moving_arm(1_000));
     assert!(bytes * 1_000.0 < LINK_BYTES_PER_S / 2.0, "{bytes} bytes a sample");
-    insta::assert_snapshot!(format!("{bytes:.2} bytes a sample, {:.1} % of the link", bytes * 1e5 / LINK_BYTES_PER_S), @"");
+    insta::assert_snapshot!(format!("{bytes:.2} bytes a sample, {:.1} % of the link", bytes * 1e5 / LINK_BYTES_PER_S), @"12.44 bytes a sample, 13.5 % of the link");
 }
 
 #[test]
 fn the_stream_of_a_moving_arm_at_5_khz_takes_less_than_the_link() {
     let bytes = bytes_per_sample(moving_arm(5_000));
     assert!(bytes * 5_000.0 < LINK_BYTES_PER_S, "{bytes} bytes a sample");
-    insta::assert_snapshot!(format!("{bytes:.2} bytes a sample, {:.1} % of the link", bytes * 5e5 / LINK_BYTES_PER_S), @"");
+    insta::assert_snapshot!(format!("{bytes:.2} bytes a sample, {:.1} % of the link", bytes * 5e5 / LINK_BYTES_PER_S), @"12.45 bytes a sample, 67.6 % of the link");
 }

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{
-    Answer, BoardHello, Command, FrameCounts, FrameReader, HostHello, MAX_FRAME, PROTOCOL, Request, ToBoard, ToHost, WhichSet,
-    decode, encode, hello_version,
+    Answer, BoardHello, Command, FrameCounts, FrameReader, HostHello, MAX_FRAME, PROTOCOL, Request, StreamSelection, ToBoard,
+    ToHost, WhichSet, decode, encode, hello_version,
 };
 
 use super::errors::{BoardError, PortError};
@@ -25,6 +25,7 @@ pub struct BoardLink {
     port: Port,
     incoming: Incoming,
     hello: BoardHello,
+    hello_frame: Vec<u8>,
     next_id: u16,
     /// Frames of the stream that came while a reply was waited for.
     waiting: VecDeque<Frame>,
@@ -70,8 +71,11 @@ impl BoardLink {
             while Instant::now() < deadline {
                 incoming.receive(&mut port)?;
                 while let Some(frame) = incoming.ready.pop_front() {
-                    if let ToHost::Hello(hello) = frame.message {
-                        return Ok(Self { port, incoming, hello, next_id: 0, waiting: VecDeque::new() });
+                    if let ToHost::Hello(hello) = frame.message
+                        && hello.version == PROTOCOL
+                    {
+                        let hello_frame = frame.bytes;
+                        return Ok(Self { port, incoming, hello, hello_frame, next_id: 0, waiting: VecDeque::new() });
                     }
                 }
                 if let Some(board) = incoming.other_version {
@@ -85,6 +89,11 @@ impl BoardLink {
     /// What the board said of itself.
     pub fn hello(&self) -> &BoardHello {
         &self.hello
+    }
+
+    /// The frame in which it said so, for a log.
+    pub fn hello_frame(&self) -> &[u8] {
+        &self.hello_frame
     }
 
     /// The port.
@@ -145,6 +154,16 @@ impl BoardLink {
             Answer::Done => Ok(()),
             _ => Err(BoardError::WrongAnswer { command: name }),
         }
+    }
+
+    /// Begins a stream. One that an earlier program left running is ended first, and what it sent is forgotten: it belongs to nobody.
+    ///
+    /// # Errors
+    /// As [`BoardLink::request`].
+    pub fn start_stream(&mut self, selection: StreamSelection) -> Result<(), BoardError> {
+        self.act(Command::StopStream)?;
+        self.waiting.clear();
+        self.act(Command::StartStream(selection))
     }
 
     /// The next frame that the board sends by itself; `None` when nothing came within a few milliseconds.

@@ -54,10 +54,8 @@ const MARGIN: f64 = 0.01;
 /// # Errors
 /// [`LvdtFitError`].
 pub fn fit_lvdt(points: &[LvdtPoint], degree: usize) -> Result<(LvdtCurve, Vec<f64>), LvdtFitError> {
+    check_lvdt_points(points.len(), degree)?;
     let terms = degree.min(LVDT_COEFFICIENTS - 1) + 1;
-    if points.len() <= terms {
-        return Err(LvdtFitError::TooFew { found: points.len(), degree, needed: terms + 1 });
-    }
     let codes = points.iter().map(|point| point.code);
     let (min, max) = codes.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), code| (min.min(code), max.max(code)));
     let spread = max - min;
@@ -82,6 +80,15 @@ pub fn fit_lvdt(points: &[LvdtPoint], degree: usize) -> Result<(LvdtCurve, Vec<f
     }
     let at = |code: f64| curve.displacement_of_code_m::<f64>(code).unwrap_or(f64::NAN);
     Ok((curve, points.iter().map(|point| point.displacement_m - at(point.code)).collect()))
+}
+
+/// Whether so many lengths are enough for a polynomial of `degree`: to be known before they are measured.
+///
+/// # Errors
+/// [`LvdtFitError::TooFew`].
+pub fn check_lvdt_points(found: usize, degree: usize) -> Result<(), LvdtFitError> {
+    let needed = degree.min(LVDT_COEFFICIENTS - 1) + 2;
+    if found < needed { Err(LvdtFitError::TooFew { found, degree, needed }) } else { Ok(()) }
 }
 
 fn is_monotonic(curve: &LvdtCurve) -> bool {

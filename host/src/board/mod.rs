@@ -10,8 +10,8 @@ mod verify;
 
 pub use errors::{BoardError, PortError};
 pub use link::{BoardLink, Frame};
-pub use lvdt_fit::{LvdtFitError, LvdtPoint, fit_lvdt};
+pub use lvdt_fit::{LvdtFitError, LvdtPoint, check_lvdt_points, fit_lvdt};
 pub use port::{BAUD, Port};
-pub use robot_on_board::{RobotOnBoard, SetError, nominal_lvdt, parameter_set};
+pub use robot_on_board::{NOMINAL_TRAVEL_M, RobotOnBoard, SetError, nominal_lvdt, parameter_set};
 pub use tally::{StreamLosses, StreamTally};
 pub use verify::{KinematicsDifference, rms_kinematics, verify_kinematics};

@@ -56,6 +56,9 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
     Ok(set)
 }
 
+/// Travel of the paper's LVDT from end to end, metres.
+pub const NOMINAL_TRAVEL_M: f64 = 0.075;
+
 /// A straight line over nine tenths of the codes: what a conditioner that is trimmed to its data sheet gives. Good enough to see
 /// the bar move; `host-cal lvdt` measures the real curve.
 pub fn nominal_lvdt(travel_m: f64) -> LvdtCurve {
@@ -123,6 +126,12 @@ impl RobotOnBoard {
     /// Kinds of the joints.
     pub fn kinds(&self) -> &[JointKind] {
         &self.set.kinds
+    }
+
+    /// Whether all encoders of the robot's joints were preset since the board started; bit i is encoder i.
+    pub fn is_homed(&self, homed: u8) -> bool {
+        let joints = (1_u16 << self.set.kinds.len()) - 1;
+        u16::from(homed) & joints == joints
     }
 
     /// The map between counts and joint values.

@@ -1,6 +1,6 @@
 //! What of a stream was lost, and where.
 
-use ballbar::wire::Stream;
+use ballbar::wire::{Status, Stream};
 use serde::Serialize;
 
 /// Losses of a stream since it was begun to be watched.
@@ -52,12 +52,25 @@ impl StreamTally {
         let now = Numbers { sequence: stream.sequence, dropped: stream.dropped, overruns: stream.overruns };
         self.losses.messages += 1;
         if let Some(last) = self.last.replace(now) {
-            let missing = u64::from(now.sequence.wrapping_sub(last.sequence).wrapping_sub(1));
-            let dropped = u64::from(now.dropped.wrapping_sub(last.dropped));
-            self.losses.missing += missing;
-            self.losses.dropped_by_board += dropped.min(missing);
-            self.losses.lost_on_line += missing.saturating_sub(dropped);
-            self.losses.overruns += u64::from(now.overruns.wrapping_sub(last.overruns));
+            self.count(last, now);
+        }
+    }
+
+    /// Counts what is missing between two messages.
+    fn count(&mut self, last: Numbers, now: Numbers) {
+        let missing = u64::from(now.sequence.wrapping_sub(last.sequence).wrapping_sub(1));
+        let dropped = u64::from(now.dropped.wrapping_sub(last.dropped));
+        self.losses.missing += missing;
+        self.losses.dropped_by_board += dropped.min(missing);
+        self.losses.lost_on_line += missing.saturating_sub(dropped);
+        self.losses.overruns += u64::from(now.overruns.wrapping_sub(last.overruns));
+    }
+
+    /// The stream has ended; `status` was asked for behind it. What is missing behind the last message shows here only.
+    pub fn end(&mut self, status: &Status) {
+        if let Some(last) = self.last.take() {
+            let now = Numbers { sequence: status.stream_messages, dropped: status.dropped, overruns: status.overruns };
+            self.count(last, now);
         }
     }
 

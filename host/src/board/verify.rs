@@ -45,8 +45,9 @@ pub fn verify_kinematics(
     for (pose, expected) in poses_of_both(link, robot, set, vectors) {
         let pose = pose?;
         let axis = |found: [f32; 3], i: usize| (wide(found) - expected.rotation.column(i)).norm();
-        difference.position_m = difference.position_m.max((wide(pose.position_m) - expected.translation_m).norm());
-        difference.axis_rad = difference.axis_rad.max(axis(pose.x_axis, 0)).max(axis(pose.y_axis, 1));
+        let position_m = (wide(pose.position_m) - expected.translation_m).norm();
+        difference.position_m = larger(difference.position_m, position_m);
+        difference.axis_rad = larger(difference.axis_rad, larger(axis(pose.x_axis, 0), axis(pose.y_axis, 1)));
         difference.reach_m = difference.reach_m.max(expected.translation_m.norm());
         on_vector();
     }
@@ -91,6 +92,11 @@ fn poses_of_both<'a>(
         };
         (pose, expected)
     })
+}
+
+/// What is not a number is larger than any: `f64::max` would pass over it.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 
 fn wide(v: [f32; 3]) -> Vector3<f64> {

@@ -10,9 +10,10 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
 use super::report::{Report, print, progress, warn};
-use crate::board::{BoardError, BoardLink, KinematicsDifference, RobotOnBoard, nominal_lvdt, parameter_set, verify_kinematics};
+use crate::board::{
+    BoardError, BoardLink, KinematicsDifference, NOMINAL_TRAVEL_M, RobotOnBoard, nominal_lvdt, parameter_set, verify_kinematics,
+};
 use crate::files::Robot;
-use crate::units::m_from_mm;
 
 /// Upload a calibrated robot to the board, and verify the board's kinematics against this program's
 #[derive(Args)]
@@ -53,8 +54,6 @@ enum ApplyError {
     Kinematics { position_um: f64, axis_urad: f64 },
 }
 
-/// Travel of the paper's LVDT, for a board that has never seen a curve.
-const NOMINAL_TRAVEL_MM: f64 = 75.0;
 const KEPT: &str = "Nothing was stored; the board keeps the parameters that it had.";
 
 /// What was stored, and how well the board computes with it.
@@ -80,7 +79,7 @@ impl ApplyArgs {
             return Err(ApplyError::NotCalibrated(robot.source_name().to_owned()).into());
         }
         // All that can be wrong with the file is found before the board is spoken to.
-        parameter_set(&robot, nominal_lvdt(m_from_mm(NOMINAL_TRAVEL_MM)))?;
+        parameter_set(&robot, nominal_lvdt(NOMINAL_TRAVEL_M))?;
         let mut link = self.port.connect()?;
         let (joints, encoders) = (robot.chain.joints(), link.hello().encoders);
         if joints > usize::from(encoders) {
@@ -94,22 +93,24 @@ impl ApplyArgs {
 
 /// Stages, verifies, stores, reads back.
 pub(super) fn upload(link: &mut BoardLink, robot: &Robot, vectors: usize) -> Result<ApplyReport, CommandError> {
+    // A program that was killed may have left a stream running, and storing would stall it.
+    link.act(Command::StopStream)?;
     let old = RobotOnBoard::read(link)?.map(|(old, _)| old);
     let lvdt = match &old {
         Some(old) => old.set().lvdt,
         None => {
             warn("the board has no LVDT curve yet: a nominal one goes with the robot. Measure the real one: host-cal lvdt PORT");
-            nominal_lvdt(m_from_mm(NOMINAL_TRAVEL_MM))
+            nominal_lvdt(NOMINAL_TRAVEL_M)
         }
     };
     let set = parameter_set(robot, lvdt)?;
-    let staged = stage_and_verify(link, robot, &set, vectors);
-    if staged.is_err() {
+    let committed = stage_and_verify(link, robot, &set, vectors)
+        .and_then(|(crc, difference)| Ok(link.act(Command::Commit { crc }).map(|()| (crc, difference))?));
+    if committed.is_err() {
         // What is staged is not in use; without it a later commit cannot store it by mistake.
         let _ = link.act(Command::Discard);
     }
-    let (crc, difference) = staged?;
-    link.act(Command::Commit { crc })?;
+    let (crc, difference) = committed?;
     if !is_on_board(link, WhichSet::Active, &set)? {
         let help = "They were stored, and the flash gives back something else: do not trust the board. Try again.";
         return Err(ApplyError::ReadBack { which: "stored", help }.into());

@@ -1,16 +1,15 @@
 //! `host-cal log`: check and export the log of a session.
 
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use miette::Diagnostic;
 use serde::Serialize;
-use thiserror::Error;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
+use crate::files::write_atomically_with;
 use crate::session::{ExportError, LogReader, LogSummary, export_csv};
 
 /// Check or export the log of a session (stream.bbl)
@@ -41,13 +40,6 @@ enum LogCommand {
         #[command(flatten)]
         output: OutputArgs,
     },
-}
-
-#[derive(Debug, Error, Diagnostic)]
-#[error("{}: cannot be written: {error}", path.display())]
-struct TableError {
-    path: PathBuf,
-    error: std::io::Error,
 }
 
 #[derive(Serialize)]
@@ -84,17 +76,19 @@ fn check(session: &std::path::Path, json: bool) -> Result<Outcome, CommandError>
 /// Writes the table under a temporary name and renames it.
 fn export(session: &std::path::Path, csv: &std::path::Path, json: bool) -> Result<Outcome, CommandError> {
     let mut reader = LogReader::open(session)?;
-    let failed = |error| CommandError::output(TableError { path: csv.to_owned(), error });
-    let folder = csv.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
-    let file = tempfile::Builder::new().prefix(".host-cal-").tempfile_in(folder).map_err(failed)?;
-    let mut out = BufWriter::new(file);
-    let samples = export_csv(&mut reader, &mut out).map_err(|error| match error {
-        ExportError::Log(error) => error.into(),
-        ExportError::Write(error) => failed(error),
-    })?;
-    out.flush().map_err(failed)?;
-    let file = out.into_inner().map_err(|error| failed(error.into_error()))?;
-    file.persist(csv).map_err(|error| failed(error.error))?;
+    let (mut samples, mut unreadable) = (0, None);
+    write_atomically_with(csv, |file| {
+        match export_csv(&mut reader, &mut BufWriter::new(file)) {
+            Ok(lines) => samples = lines,
+            Err(ExportError::Write(error)) => return Err(error),
+            Err(ExportError::Log(error)) => {
+                unreadable = Some(error);
+                return Err(std::io::Error::other("the log cannot be read"));
+            }
+        }
+        Ok(())
+    })
+    .map_err(|error| unreadable.take().map_or_else(|| CommandError::output(error), CommandError::from))?;
     let report = ExportReport { log: reader.path().display().to_string(), csv: csv.display().to_string(), samples };
     print(&report, json)?;
     Ok(Outcome::Good)

@@ -1,8 +1,9 @@
 //! `host-cal lvdt`: measure the LVDT's curve from known lengths.
 
 use std::io::{IsTerminal, Write, stderr, stdin};
+use std::time::{Duration, Instant};
 
-use ballbar::wire::{Answer, Command, Event, StreamSelection, ToHost};
+use ballbar::wire::{Answer, Command, Event, Refusal, StreamSelection, ToHost};
 use ballbar::{LVDT_COEFFICIENTS, SettledPose, StillnessCriteria};
 use clap::Args;
 use miette::Diagnostic;
@@ -14,7 +15,7 @@ use super::outcome::{CommandError, Outcome};
 use super::port::{EndRequest, PortArgs};
 use super::report::{Report, print};
 use super::table::{Columns, fixed};
-use crate::board::{BoardError, BoardLink, LvdtPoint, RobotOnBoard, fit_lvdt};
+use crate::board::{BoardError, BoardLink, LvdtPoint, RobotOnBoard, check_lvdt_points, fit_lvdt};
 use crate::units::{m_from_mm, mm_from_m};
 
 /// Measure the LVDT's curve from known lengths, and store it on the board
@@ -57,6 +58,9 @@ enum LvdtError {
     Ended { found: usize, wanted: usize },
 }
 
+/// How long an arm that moves is waited for.
+const STORE_PATIENCE: Duration = Duration::from_secs(10);
+
 #[derive(Serialize)]
 struct LvdtReport {
     degree: u8,
@@ -66,7 +70,7 @@ struct LvdtReport {
     code_min: u16,
     code_max: u16,
     coefficients_mm: [f64; LVDT_COEFFICIENTS],
-    /// stored, not stored: too far off, or not stored: dry run.
+    /// Whether the curve was stored, and why not.
     outcome: &'static str,
 }
 
@@ -84,9 +88,14 @@ impl LvdtArgs {
             let (flag, found) = ("--bar and --lengths", bad.to_string());
             return Err(ListError::Number { flag, found, expected: "millimetres above 0, at most 1e6" }.into());
         }
+        check_lvdt_points(self.lengths.len(), usize::from(self.degree))?;
         let mut link = self.port.connect()?;
         RobotOnBoard::read(&mut link)?.ok_or(LvdtError::NoParameters)?;
-        let poses = self.measure(&mut link)?;
+        let measured = self.measure(&mut link);
+        // Whatever came of it, the board is left as it is after its start.
+        let left = link.act(Command::StopStream).and_then(|()| link.act(Command::SetStillness(StillnessCriteria::default())));
+        let poses = measured?;
+        left?;
         let point = |(&length_mm, pose): (&f64, &SettledPose)| LvdtPoint {
             displacement_m: m_from_mm(length_mm - self.bar),
             code: pose.code_mean,
@@ -102,13 +111,13 @@ impl LvdtArgs {
             residual_mm: mm_from_m(m),
         };
         let max_abs_mm = mm_from_m(residuals_m.iter().fold(0.0, |max: f64, m| max.max(m.abs())));
-        let outcome = match max_abs_mm <= self.tolerance_mm {
-            false => "not stored: too far off",
-            true if self.dry_run => "not stored: dry run",
-            true => {
-                store(&mut link, curve)?;
-                "stored"
-            }
+        let (outcome, stored) = match max_abs_mm <= self.tolerance_mm {
+            false => ("not stored: too far off", Ok(())),
+            true if self.dry_run => ("not stored: dry run", Ok(())),
+            true => match store(&mut link, curve) {
+                Ok(()) => ("stored", Ok(())),
+                Err(error) => ("not stored: see the error", Err(error)),
+            },
         };
         let report = LvdtReport {
             degree: self.degree,
@@ -120,7 +129,9 @@ impl LvdtArgs {
             coefficients_mm: curve.coefficients_m.map(|m| mm_from_m(f64::from(m))),
             outcome,
         };
+        // What was measured by hand is shown, whatever became of it.
         print(&report, self.output.json)?;
+        stored?;
         Ok(if max_abs_mm <= self.tolerance_mm { Outcome::Good } else { Outcome::Doubtful })
     }
 
@@ -133,30 +144,34 @@ impl LvdtArgs {
             band_counts: u16::MAX,
             ..StillnessCriteria::default()
         };
-        let mut poses = Vec::new();
+        let mut poses: Vec<SettledPose> = Vec::new();
         for &length_mm in &self.lengths {
             let _ = writeln!(stderr(), "set the bar to {length_mm} mm and hold it still");
             let is_told = stdin().is_terminal();
-            if is_told {
-                let _ = write!(stderr(), "press Enter when it stands: ");
-                let _ = stdin().read_line(&mut String::new());
+            let ended = LvdtError::Ended { found: poses.len(), wanted: self.lengths.len() };
+            if is_told && !is_entered(&end) {
+                return Err(ended.into());
             }
             // Asked for anew, so that stillness before now does not count.
             link.act(Command::SetStillness(criteria))?;
-            link.act(Command::StartStream(StreamSelection { settled: true, ..StreamSelection::default() }))?;
+            link.start_stream(StreamSelection { settled: true, ..StreamSelection::default() })?;
             // Nobody says when the next length is set: a code that has not moved is still that of the last one.
-            let old_code = poses.last().map(|pose: &SettledPose| pose.code_mean).filter(|_| !is_told);
+            let old_code = poses.last().map(|pose| pose.code_mean).filter(|_| !is_told);
             let is_new =
                 |pose: &SettledPose| old_code.is_none_or(|old| (pose.code_mean - old).abs() > f64::from(criteria.band_codes));
-            let pose = next_settled(link, &end, is_new)?;
-            link.act(Command::StopStream)?;
-            let pose = pose.ok_or(LvdtError::Ended { found: poses.len(), wanted: self.lengths.len() })?;
+            let pose = next_settled(link, &end, is_new)?.ok_or(ended)?;
             let _ = writeln!(stderr(), "  code {:.1} ± {:.1} over {} samples", pose.code_mean, pose.code_std, pose.samples);
             poses.push(pose);
         }
-        link.act(Command::SetStillness(StillnessCriteria::default()))?;
         Ok(poses)
     }
+}
+
+/// Waits for Enter; false when the user ends instead.
+fn is_entered(end: &EndRequest) -> bool {
+    let _ = write!(stderr(), "press Enter when it stands, or Ctrl-C and Enter to end: ");
+    let is_open = stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0);
+    is_open && !end.is_made()
 }
 
 fn next_settled(
@@ -173,16 +188,24 @@ fn next_settled(
             return Ok(Some(pose));
         }
     }
-    let _ = link.act(Command::StopStream);
     Ok(None)
 }
 
+/// Stages the curve and stores it; while the arm moves, the store is tried again for some seconds.
 fn store(link: &mut BoardLink, curve: ballbar::LvdtCurve) -> Result<(), CommandError> {
     link.act(Command::Discard)?;
     let Answer::Staged { crc } = link.request(Command::SetLvdt(curve))? else {
         return Err(BoardError::WrongAnswer { command: "set LVDT" }.into());
     };
-    Ok(link.act(Command::Commit { crc })?)
+    let began = Instant::now();
+    loop {
+        match link.act(Command::Commit { crc }) {
+            Err(BoardError::Refused { refusal: Refusal::Moving, .. }) if began.elapsed() < STORE_PATIENCE => {
+                std::thread::sleep(Duration::from_millis(200));
+            }
+            stored => return Ok(stored?),
+        }
+    }
 }
 
 impl Report for LvdtReport {

@@ -63,13 +63,12 @@ impl PoseReport {
         let (x, y) = (wide(pose.pose.x_axis), wide(pose.pose.y_axis));
         let z = x.cross(&y);
         let kinds = robot.kinds().to_vec();
-        let joints = (1_u16 << kinds.len()) - 1;
         Self {
             position_mm: pose.pose.position_m.map(|m| mm_from_m(f64::from(m))),
             rotation: [0, 1, 2].map(|row| [x[row], y[row], z[row]]),
             q: kinds.iter().zip(&pose.q).map(|(&kind, &q)| ScreenUnit::from(kind).from_si(f64::from(q))).collect(),
             displacement_mm: pose.displacement_m.map(|m| mm_from_m(f64::from(m))),
-            homed: u16::from(pose.homed) & joints == joints,
+            homed: robot.is_homed(pose.homed),
             robot: robot.set().name.as_str().to_owned(),
             calibrated: robot.set().is_calibrated,
             t_s: pose.t_us as f64 * 1e-6,

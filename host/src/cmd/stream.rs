@@ -53,10 +53,10 @@ pub(super) struct StreamArgs {
     #[arg(long)]
     pose: bool,
     /// Samples a second, 100 to 5000
-    #[arg(long, default_value_t = 1000, value_name = "HZ")]
+    #[arg(long, default_value_t = 1000, value_name = "HZ", value_parser = clap::value_parser!(u16).range(100..=5_000))]
     rate: u16,
-    /// How long the arm must stand still, milliseconds
-    #[arg(long, default_value_t = 500, value_name = "MS")]
+    /// How long the arm must stand still, 10 to 60000 milliseconds
+    #[arg(long, default_value_t = 500, value_name = "MS", value_parser = clap::value_parser!(u32).range(10..=60_000))]
     hold_ms: u32,
     /// Band of the encoders within which the arm stands still, counts
     #[arg(long, default_value_t = StillnessCriteria::default().band_counts, value_name = "N")]
@@ -116,6 +116,8 @@ struct StreamReport {
     settled: u64,
     tool_poses: u64,
     poses_written: u64,
+    /// Settled poses that were not written because not every encoder was homed.
+    poses_withheld: u64,
     losses: StreamLosses,
     frames: FrameLine,
     gaps: u64,
@@ -142,13 +144,14 @@ impl StreamArgs {
             return Err(StreamError::NoParameters.into());
         }
         let recorder = self.recorder(&link, robot.as_ref(), connection)?;
-        let account = Account::new(robot.map(|(robot, _)| robot), recorder, self.bar);
+        let account = Account::new(robot.map(|(robot, _)| robot), recorder, self.bar, self.criteria());
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
         let report = watch.finish()?;
         print(&report, self.output.json)?;
         ended?;
-        Ok(if report.losses.missing + report.losses.overruns + report.gaps == 0 { Outcome::Good } else { Outcome::Doubtful })
+        let doubts = report.losses.missing + report.losses.overruns + report.gaps + report.poses_withheld;
+        Ok(if doubts == 0 { Outcome::Good } else { Outcome::Doubtful })
     }
 
     /// What is streamed.
@@ -159,11 +162,15 @@ impl StreamArgs {
 
     /// Tells the board what to do; again after it was away.
     fn start(&self, link: &mut BoardLink) -> Result<(), crate::board::BoardError> {
-        let hold_us = self.hold_ms.saturating_mul(1_000);
-        let criteria = StillnessCriteria { hold_us, band_counts: self.band_counts, band_codes: self.band_codes };
         link.act(Command::SetRate { rate_hz: self.rate })?;
-        link.act(Command::SetStillness(criteria))?;
-        link.act(Command::StartStream(self.selection()))
+        link.act(Command::SetStillness(self.criteria()))?;
+        link.start_stream(self.selection())
+    }
+
+    /// What counts as standing still.
+    fn criteria(&self) -> StillnessCriteria {
+        let hold_us = self.hold_ms.saturating_mul(1_000);
+        StillnessCriteria { hold_us, band_counts: self.band_counts, band_codes: self.band_codes }
     }
 
     fn connection(&self) -> Result<Option<Connection>, CommandError> {
@@ -211,6 +218,7 @@ impl StreamArgs {
         let kinds = robot.map_or(&[][..], |(robot, _)| robot.kinds());
         let connection = connection.map(|connection| (connection, kinds));
         let mut recorder = Recorder::begin(session, run, connection).map_err(record_error)?;
+        recorder.frame(link.hello_frame()).map_err(record_error)?;
         if let Some((_, frame)) = robot {
             recorder.frame(frame).map_err(record_error)?;
         }
@@ -281,6 +289,9 @@ impl Report for StreamReport {
         }
         if let Some(session) = &self.session {
             text += &format!("recorded in {session}, {} poses added to poses.csv\n", self.poses_written);
+        }
+        if self.poses_withheld > 0 {
+            text += &format!("{} poses were NOT WRITTEN because the encoders are not homed\n", self.poses_withheld);
         }
         text
     }

@@ -13,7 +13,7 @@ use super::inputs::{ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
 use super::port::EndRequest;
 use super::report::{Report, print, progress};
-use crate::board::parameter_set;
+use crate::board::{NOMINAL_TRAVEL_M, parameter_set};
 use crate::files::{Rig, Robot};
 use crate::simulate::Shells;
 use crate::units::m_from_mm;
@@ -113,8 +113,6 @@ struct VirtualBoardReport {
     ready: bool,
 }
 
-/// Travel of the paper's LVDT, for a rig that does not say.
-const NOMINAL_TRAVEL_MM: f64 = 75.0;
 /// Time between two looks at the board.
 const LOOK: Duration = Duration::from_millis(20);
 /// With --once: so long must the host have had nothing to read, and so long is waited for one that does not read.
@@ -187,7 +185,7 @@ impl VirtualBoardArgs {
     }
 
     fn power_up(&self, truth: &Robot, design: &Robot, rig: &Rig) -> Result<VirtualBoard, CommandError> {
-        let travel_m = rig.bar.as_ref().map_or(m_from_mm(NOMINAL_TRAVEL_MM), |bar| bar.travel_m);
+        let travel_m = rig.bar.as_ref().map_or(NOMINAL_TRAVEL_M, |bar| bar.travel_m);
         let plant = Plant::new(truth, travel_m, self.seed)?;
         let parameters = if self.ready { Some(parameter_set(design, plant.lvdt())?) } else { None };
         let options = VirtualBoardOptions {

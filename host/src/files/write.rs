@@ -1,5 +1,6 @@
 //! Writing a file so that no reader ever sees half of it.
 
+use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -21,14 +22,22 @@ pub struct WriteError {
 /// # Errors
 /// [`WriteError`] with the operating system's reason; an older file of that name is left as it was.
 pub fn write_atomically(path: &Path, contents: &str) -> Result<(), WriteError> {
-    replace(path, contents).map_err(|error| {
+    write_atomically_with(path, |file| file.write_all(contents.as_bytes()))
+}
+
+/// As [`write_atomically`], with contents that `write` writes piece by piece.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_atomically_with(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> Result<(), WriteError> {
+    replace(path, write).map_err(|error| {
         // Without the temporary name that the error may carry, which means nothing to the user.
         let error = if error.raw_os_error().is_none() && error.kind() != ErrorKind::Other { error.kind().into() } else { error };
         WriteError { path: path.to_owned(), error }
     })
 }
 
-fn replace(path: &Path, contents: &str) -> std::io::Result<()> {
+fn replace(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> std::io::Result<()> {
     let target = match path.canonicalize() {
         Ok(target) if target.is_file() => target,
         Ok(_) => return Err(std::io::Error::other("it is there, but is no regular file")),
@@ -38,7 +47,7 @@ fn replace(path: &Path, contents: &str) -> std::io::Result<()> {
     let mut builder = tempfile::Builder::new();
     with_usual_permissions(&mut builder);
     let mut file = builder.prefix(".host-cal-").tempfile_in(folder)?;
-    file.write_all(contents.as_bytes())?;
+    write(file.as_file_mut())?;
     file.as_file().sync_all()?;
     file.persist(&target).map_err(|error| error.error)?;
     Ok(())

@@ -23,7 +23,7 @@ pub enum ExportError {
     Write(#[from] std::io::Error),
 }
 
-/// Writes every sample of a log as a line: run and gap numbers, the board's clock, counts, code, and, from where the log knows the
+/// Writes every sample of a log as a line: run and gap numbers, the board's clock, counts, code, whether all joints were homed, and, from where the log knows the
 /// board's parameters, joint values and displacement. Returns how many.
 ///
 /// # Errors
@@ -42,7 +42,7 @@ pub fn export_csv(reader: &mut LogReader, out: &mut impl Write) -> Result<u64, E
             ToHost::Stream(stream) => {
                 if let Event::Samples(batch) = stream.event {
                     for sample in batch.samples() {
-                        table.line(&sample)?;
+                        table.line(&sample, stream.homed)?;
                     }
                 }
             }
@@ -64,7 +64,7 @@ struct Table<'a, W> {
 }
 
 impl<W: Write> Table<'_, W> {
-    fn line(&mut self, sample: &Sample) -> std::io::Result<()> {
+    fn line(&mut self, sample: &Sample, homed: u8) -> std::io::Result<()> {
         let kinds = match self.columns.take() {
             Some(kinds) => kinds,
             None => self.header(sample.counts.len())?,
@@ -73,6 +73,7 @@ impl<W: Write> Table<'_, W> {
         fields.extend(sample.counts.iter().map(i32::to_string));
         fields.push(sample.lvdt.code.to_string());
         fields.push(u8::from(sample.lvdt.saturated).to_string());
+        fields.push(self.robot.as_ref().map_or(String::new(), |robot| u8::from(robot.is_homed(homed)).to_string()));
         let q = self.robot.as_ref().map(|robot| robot.q(sample.counts.iter().map(|&counts| f64::from(counts))));
         fields.extend(kinds.iter().enumerate().map(|(i, &kind)| {
             q.as_ref().map_or(String::new(), |q| format!("{:.9}", ScreenUnit::from(kind).from_si(q.as_array()[i])))
@@ -91,7 +92,7 @@ impl<W: Write> Table<'_, W> {
         let counts = (1..=encoders).map(|i| format!("counts{i}"));
         let joints = kinds.iter().enumerate().map(|(i, &kind)| format!("q{}_{}", i + 1, ScreenUnit::from(kind).name()));
         let before = ["segment", "index", "t_us"].map(str::to_owned).into_iter().chain(counts);
-        let columns = before.chain(["code", "saturated"].map(str::to_owned)).chain(joints);
+        let columns = before.chain(["code", "saturated", "homed"].map(str::to_owned)).chain(joints);
         let columns: Vec<String> = columns.chain(["displacement_mm".to_owned()]).collect();
         writeln!(self.out, "{}", columns.join(","))?;
         Ok(kinds)

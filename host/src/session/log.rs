@@ -67,6 +67,8 @@ fn header() -> [u8; HEADER_BYTES] {
 pub struct LogWriter {
     path: PathBuf,
     file: File,
+    /// A frame could not be written whole: the next one must not be taken for its rest.
+    is_torn: bool,
 }
 
 impl LogWriter {
@@ -87,7 +89,7 @@ impl LogWriter {
             // Ends the frame that a killed program may have left torn; after a whole one it changes nothing.
             file.write_all(&[0]).map_err(io("cannot be written"))?;
         }
-        let mut writer = Self { path: path.to_owned(), file };
+        let mut writer = Self { path: path.to_owned(), file, is_torn: false };
         writer.mark(LogMark::Opened { unix_ms: unix_ms() })?;
         Ok(writer)
     }
@@ -97,8 +99,10 @@ impl LogWriter {
     /// # Errors
     /// [`LogError::Io`].
     pub fn frame(&mut self, bytes: &[u8]) -> Result<(), LogError> {
-        let failed = |error| LogError::Io { path: self.path.clone(), doing: "cannot be written", error };
-        self.file.write_all(bytes).map_err(failed)
+        let torn = if self.is_torn { self.file.write_all(&[0]) } else { Ok(()) };
+        let written = torn.and_then(|()| self.file.write_all(bytes));
+        self.is_torn = written.is_err();
+        written.map_err(|error| LogError::Io { path: self.path.clone(), doing: "cannot be written", error })
     }
 
     /// Notes that the port was lost or is back.

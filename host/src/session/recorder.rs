@@ -93,6 +93,11 @@ impl Recorder {
         Ok(())
     }
 
+    /// Whether settled poses go to poses.csv.
+    pub fn writes_poses(&self) -> bool {
+        self.poses.is_some()
+    }
+
     /// Keeps a settled pose; does nothing when no connection was named.
     ///
     /// # Errors

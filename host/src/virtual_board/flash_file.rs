@@ -7,6 +7,8 @@ use ballbar_firmware::{MemoryFlash, MemoryFlashError, ParameterFlash};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use thiserror::Error;
 
+use crate::files::write_atomically_with;
+
 type Memory = MemoryFlash<Vec<u8>>;
 
 /// Flash in memory, and in a file where one was named: the file is replaced, by rename, after every erase and write.
@@ -55,12 +57,7 @@ impl FlashFile {
 
     fn save(&self) -> io::Result<()> {
         let Some(path) = &self.path else { return Ok(()) };
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut file = tempfile::Builder::new().prefix(".host-cal-").tempfile_in(folder)?;
-        file.write_all(self.memory.memory())?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|error| error.error)?;
-        Ok(())
+        write_atomically_with(path, |file| file.write_all(self.memory.memory())).map_err(io::Error::other)
     }
 }
 

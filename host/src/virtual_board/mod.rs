@@ -189,9 +189,6 @@ impl VirtualBoard {
     pub fn bit_flips(&self) -> u64 {
         self.shared.flips.load(Ordering::Relaxed)
     }
-
-    /// Switches the board off, as dropping it does.
-    pub fn stop(self) {}
 }
 
 impl Drop for VirtualBoard {

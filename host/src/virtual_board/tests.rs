@@ -232,7 +232,7 @@ fn parameters_outlive_the_program_in_a_file() {
     host.hello();
     let Ok(Answer::Staged { crc }) = host.ask(Command::WriteParameters(set.clone())) else { panic!() };
     host.ask(Command::Commit { crc }).unwrap();
-    board.stop();
+    drop(board);
 
     // A ready board's own parameters do not take the place of those that somebody stored.
     let board = VirtualBoard::start(VirtualBoardOptions { flash_file, ..ready(Pace::Real) }).unwrap();
@@ -266,7 +266,7 @@ fn a_named_port_is_a_link_that_goes_with_the_board() {
     let board = VirtualBoard::start(VirtualBoardOptions { port_name: Some(name.clone()), ..options(Pace::Real) }).unwrap();
     assert_eq!(board.port(), name.display().to_string());
     Host::open(&board).hello();
-    board.stop();
+    drop(board);
     assert!(!name.is_symlink());
 
     std::fs::write(&name, "a file").unwrap();

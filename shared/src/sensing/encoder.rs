@@ -40,11 +40,12 @@ impl ExtendedCounter {
     }
 }
 
-/// Checks that index pulses come whole turns of the encoder apart: a count lost or invented between two pulses shows.
+/// Checks that index pulses come whole turns of the encoder from the first one: counts that were lost or invented show, also when
+/// they are few a turn.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IndexCheck {
     counts_per_index: u32,
-    last_pulse: Option<i32>,
+    reference: Option<i32>,
     pulses: u32,
     errors: u32,
 }
@@ -58,24 +59,35 @@ impl IndexCheck {
         Self { counts_per_index, ..Self::default() }
     }
 
-    /// A pulse came at this position. After an error the new pulse is what the next one is compared with, so that a slip counts
+    /// A pulse came at this position. After an error the new pulse is what the next ones are compared with, so that a slip counts
     /// once.
     pub fn pulse(&mut self, position: i32) {
         self.pulses = self.pulses.saturating_add(1);
-        if let Some(last) = self.last_pulse
-            && self.counts_per_index > 0
-        {
-            let apart = last.abs_diff(position) % self.counts_per_index;
-            if apart.min(self.counts_per_index - apart) > INDEX_TOLERANCE_COUNTS {
-                self.errors = self.errors.saturating_add(1);
-            }
+        let Some(reference) = self.reference else {
+            self.reference = Some(position);
+            return;
+        };
+        if self.counts_per_index == 0 {
+            return;
         }
-        self.last_pulse = Some(position);
+        let apart = reference.abs_diff(position) % self.counts_per_index;
+        if apart.min(self.counts_per_index - apart) > INDEX_TOLERANCE_COUNTS {
+            self.errors = self.errors.saturating_add(1);
+            self.reference = Some(position);
+        }
     }
 
-    /// Forgets where the last pulse was: positions were preset, and the next pulse begins anew.
+    /// Forgets where pulses were: positions were preset, and the next pulse begins anew.
     pub fn restart(&mut self) {
-        self.last_pulse = None;
+        self.reference = None;
+    }
+
+    /// From here on pulses are this far apart; what was counted stays.
+    pub fn set_counts_per_index(&mut self, counts_per_index: u32) {
+        if self.counts_per_index != counts_per_index {
+            self.counts_per_index = counts_per_index;
+            self.restart();
+        }
     }
 
     /// Pulses seen.
@@ -83,7 +95,7 @@ impl IndexCheck {
         self.pulses
     }
 
-    /// Pulses that were no whole number of turns from the one before.
+    /// Pulses that were no whole number of turns from the first, or from the last error.
     pub fn errors(&self) -> u32 {
         self.errors
     }

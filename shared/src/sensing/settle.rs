@@ -72,6 +72,8 @@ pub struct SettleDetector {
 struct Window {
     index: u32,
     t_us: u64,
+    /// Index of the latest sample: what was not seen may have been motion.
+    last_index: u32,
     samples: u32,
     counts: Vec<Spread, MAX_JOINTS>,
     code: Spread,
@@ -110,6 +112,7 @@ impl SettleDetector {
                 if !self.is_reported {
                     window.add(sample);
                 }
+                window.last_index = sample.index;
             }
             _ => {
                 self.window = Some(Window::new(sample));
@@ -146,15 +149,17 @@ impl Window {
         Self {
             index: sample.index,
             t_us: sample.t_us,
+            last_index: sample.index,
             samples: 1,
             counts: sample.counts.iter().map(|&counts| Spread::new(counts)).collect(),
             code: Spread::new(i32::from(sample.lvdt.code)),
         }
     }
 
-    /// Whether every channel would stay in its band.
+    /// Whether the sample follows, and every channel would stay in its band.
     fn admits(&self, sample: &Sample, criteria: &StillnessCriteria) -> bool {
-        self.counts.len() == sample.counts.len()
+        sample.index == self.last_index.wrapping_add(1)
+            && self.counts.len() == sample.counts.len()
             && self.code.admits(i32::from(sample.lvdt.code), criteria.band_codes)
             && channels(&self.counts, &sample.counts).all(|(spread, counts)| spread.admits(counts, criteria.band_counts))
     }

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::messages::ToolPose;
 use crate::{Counts, LvdtReading, Sample};
 
-/// Samples in one batch, the first included.
-pub const MAX_BATCH: usize = 24;
+/// Samples in one batch, the first included: as many as fit into a frame when every one of eight encoders leaps at every sample.
+pub const MAX_BATCH: usize = 20;
 /// Poses in one batch.
 pub const MAX_POSE_BATCH: usize = 8;
 

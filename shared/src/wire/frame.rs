@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use crate::crc32::{crc32, crc32_digest};
 
-/// The most bytes that a message may have as postcard.
+/// A message of so many bytes as postcard always fits into a frame.
 pub const MAX_PAYLOAD: usize = 1024;
 const CRC_BYTES: usize = 4;
 /// The most bytes of a frame: COBS adds one byte for every 254 and one more, and the zero ends it.
@@ -30,7 +30,8 @@ impl core::error::Error for FrameError {}
 /// Writes `message` as a frame, its zero byte included, into `buffer`; returns the frame.
 ///
 /// # Errors
-/// [`FrameError`] when the message has more than [`MAX_PAYLOAD`] bytes.
+/// [`FrameError`] when the message does not fit; with [`MAX_PAYLOAD`] bytes or fewer it always does. A few more pass when zeros
+/// among them leave COBS less to add, and are read like any other.
 pub fn encode<'a, T: Serialize + ?Sized>(message: &T, buffer: &'a mut [u8; MAX_FRAME]) -> Result<&'a [u8], FrameError> {
     let cobs = Cobs::try_new(Slice::new(buffer)).map_err(|_| FrameError)?;
     let frame = postcard::serialize_with_flavor(message, CrcModifier::new(cobs, crc32_digest()));

@@ -8,6 +8,7 @@
 
 mod board;
 mod clock;
+#[path = "../common/crash.rs"]
 mod crash;
 mod encoders;
 mod flash;

@@ -9,7 +9,7 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use crate::crash;
 
 /// At the nominal 32 kHz of its oscillator; 2.7 s at its fastest (47 kHz), 7.5 s at its slowest (17 kHz). The longest that the
-/// main loop stands still is an erase of one sector of flash, 0.5 s.
+/// main loop stands still is the very first store of parameters, which erases two sectors of flash, 1 s.
 const WATCHDOG_PERIOD_MS: u32 = 4_000;
 
 /// Why the processor started. Clears what it reads, so that the next start tells of its own cause only.
@@ -40,6 +40,10 @@ pub(crate) fn start_watchdog(iwdg: IWDG, debug: &DBGMCU) -> IndependentWatchdog 
     let mut watchdog = IndependentWatchdog::new(iwdg);
     watchdog.stop_on_debug(debug, true);
     watchdog.start(WATCHDOG_PERIOD_MS.millis());
+    // Started, it counts from its longest period; the one asked for is taken some cycles of its oscillator later, and holds from
+    // the next feed on. A millisecond of the 16 MHz that the processor starts with.
+    cortex_m::asm::delay(16_000);
+    watchdog.feed();
     watchdog
 }
 

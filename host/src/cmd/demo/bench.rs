@@ -5,7 +5,7 @@ use ballbar::{SettledPose, StillnessCriteria};
 use miette::Diagnostic;
 use thiserror::Error;
 
-use crate::board::{BAUD, BoardLink, RobotOnBoard, StreamLosses, StreamTally, parameter_set};
+use crate::board::{BAUD, BoardLink, NOMINAL_TRAVEL_M, RobotOnBoard, StreamLosses, StreamTally, parameter_set};
 use crate::cmd::outcome::CommandError;
 use crate::cmd::report::progress;
 use crate::files::{PairingId, Rig, Robot, pose_header, pose_record};
@@ -50,8 +50,6 @@ enum BenchError {
 /// Noise of every length, the paper's.
 pub(super) const SIGMA_MM: f64 = 0.084;
 const POSES_PER_PAIRING: usize = 90;
-/// Travel of the paper's LVDT, for a rig that does not say.
-const TRAVEL_MM: f64 = 75.0;
 const RATE_HZ: u16 = 500;
 const CRITERIA: StillnessCriteria = StillnessCriteria { hold_us: 300_000, band_counts: 3, band_codes: 64 };
 /// How long the robot stands at a pose: its ringing dies away, and then it holds.
@@ -63,7 +61,7 @@ const SENT_WITHIN_DEG: f64 = 0.05;
 impl<'a> Bench<'a> {
     /// A board that holds the design's parameters and the LVDT's curve, homed, with the true robot before it.
     pub(super) fn power_up(scene: &'a Scene, seed: u64) -> Result<Self, CommandError> {
-        let travel_m = scene.rig.bar.as_ref().map_or(m_from_mm(TRAVEL_MM), |bar| bar.travel_m);
+        let travel_m = scene.rig.bar.as_ref().map_or(NOMINAL_TRAVEL_M, |bar| bar.travel_m);
         let plant = Plant::new(&scene.truth, travel_m, seed)?;
         let parameters = Some(parameter_set(&scene.design, plant.lvdt())?);
         let options = VirtualBoardOptions { parameters, is_homed: true, ..VirtualBoardOptions::new(plant, Pace::Free) };
@@ -92,7 +90,7 @@ impl<'a> Bench<'a> {
         self.link.act(Command::SetRate { rate_hz: RATE_HZ })?;
         self.link.act(Command::SetStillness(CRITERIA))?;
         self.board.play_with_stream(script);
-        self.link.act(Command::StartStream(StreamSelection { settled: true, ..StreamSelection::default() }))?;
+        self.link.start_stream(StreamSelection { settled: true, ..StreamSelection::default() })?;
 
         let kinds = self.robot.kinds().to_vec();
         let pairings: Vec<PairingId> =

@@ -1,13 +1,15 @@
 //! What came of a stream so far: counts, losses, the latest values, and the recording.
 
-use ballbar::SettledPose;
 use ballbar::wire::{Event, Status, Stream, ToHost};
+use ballbar::{JointVector, SettledPose, StillnessCriteria};
 
 use super::live::Latest;
 use super::record_error;
+use super::watch::RobotAndFrame;
 use crate::board::{Frame, RobotOnBoard, StreamTally};
 use crate::cmd::outcome::CommandError;
 use crate::session::Recorder;
+use crate::units::mm_from_m;
 
 /// The books of one run.
 pub(super) struct Account {
@@ -20,17 +22,32 @@ pub(super) struct Account {
     pub(super) settled: u64,
     pub(super) tool_poses: u64,
     pub(super) written: u64,
+    /// Settled poses that were not written because not every encoder was homed.
+    pub(super) withheld: u64,
     pub(super) gaps: u64,
+    /// The pose that was written last, when the port was lost since: an arm that still stands there settles again.
+    doubtful: Option<SettledPose>,
+    last_written: Option<SettledPose>,
+    criteria: StillnessCriteria,
     /// Time and index of the first and the latest sample since the port was last lost.
     clock: Option<[(u64, u32); 2]>,
 }
 
 impl Account {
-    pub(super) fn new(robot: Option<RobotOnBoard>, recorder: Option<Recorder>, bar_mm: Option<f64>) -> Self {
+    pub(super) fn new(
+        robot: Option<RobotOnBoard>,
+        recorder: Option<Recorder>,
+        bar_mm: Option<f64>,
+        criteria: StillnessCriteria,
+    ) -> Self {
         Self {
             robot,
             recorder,
             bar_mm,
+            withheld: 0,
+            doubtful: None,
+            last_written: None,
+            criteria,
             tally: StreamTally::default(),
             latest: Latest::default(),
             samples: 0,
@@ -81,19 +98,16 @@ impl Account {
         self.gaps += 1;
         self.tally.interrupt();
         self.clock = None;
+        self.doubtful = self.last_written.take().or(self.doubtful.take());
         self.recorder.as_mut().map_or(Ok(()), Recorder::lost).map_err(record_error)
     }
 
-    /// The port is back; `parameters` is the frame with what the board now uses.
-    pub(super) fn regain(&mut self, robot: Option<(RobotOnBoard, Vec<u8>)>) -> Result<(), CommandError> {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.back().map_err(record_error)?;
-            if let Some((_, frame)) = &robot {
-                recorder.frame(frame).map_err(record_error)?;
-            }
-        }
-        self.robot = robot.map(|(robot, _)| robot);
-        Ok(())
+    /// The port is back, with the frames in which the board said what it is and what it uses.
+    pub(super) fn regain(&mut self, hello_frame: &[u8], robot: Option<&RobotAndFrame>) -> Result<(), CommandError> {
+        let Some(recorder) = &mut self.recorder else { return Ok(()) };
+        recorder.back().map_err(record_error)?;
+        recorder.frame(hello_frame).map_err(record_error)?;
+        robot.map_or(Ok(()), |(_, frame)| recorder.frame(frame)).map_err(record_error)
     }
 
     /// Samples a second by the board's clock.
@@ -111,21 +125,50 @@ impl Account {
         };
         let (q, displacement_m) = robot.settled(pose);
         let joints = crate::cmd::port::joints_text(robot.kinds(), q.as_array());
-        let joints_of_robot = (1_u16 << robot.kinds().len()) - 1;
-        let not_homed = if u16::from(stream.homed) & joints_of_robot == joints_of_robot { "" } else { "  NOT HOMED" };
+        let is_homed = robot.is_homed(stream.homed);
         let Some(displacement_m) = displacement_m else {
-            return Ok(format!("settled {number}: {joints}, and the bar beyond its travel: no pose{not_homed}"));
+            return Ok(format!("settled {number}: {joints}, and the bar beyond its travel: no pose"));
         };
-        if let Some(recorder) = &mut self.recorder {
-            let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
-            recorder.pose(q, displacement_m, t_s).map_err(record_error)?;
-            self.written += 1;
-        }
-        let displacement_mm = displacement_m * 1e3;
+        let displacement_mm = mm_from_m(displacement_m);
         let length = match self.bar_mm {
             Some(bar_mm) => format!("{:.4} mm", bar_mm + displacement_mm),
             None => format!("{displacement_mm:+.4} mm from mid travel"),
         };
-        Ok(format!("settled {number}: {joints}, {length}, {} samples{not_homed}", pose.samples))
+        let fate = self.keep(pose, q, displacement_m, is_homed)?;
+        Ok(format!("settled {number}: {joints}, {length}, {} samples{fate}", pose.samples))
     }
+
+    /// Writes a pose, where poses are written, and says when it is not.
+    fn keep(
+        &mut self,
+        pose: &SettledPose,
+        q: JointVector<f64>,
+        displacement_m: f64,
+        is_homed: bool,
+    ) -> Result<&'static str, CommandError> {
+        let not_homed = "; NOT HOMED: host-cal home PORT --q …";
+        let Some(recorder) = self.recorder.as_mut().filter(|recorder| recorder.writes_poses()) else {
+            return Ok(if is_homed { "" } else { not_homed });
+        };
+        if !is_homed {
+            self.withheld += 1;
+            return Ok("; not written, because the encoders are NOT HOMED: host-cal home PORT --q …");
+        }
+        if self.doubtful.take().is_some_and(|before| is_same_stand(&before, pose, &self.criteria)) {
+            self.last_written = Some(pose.clone());
+            return Ok("; still where the last pose was written: not written again");
+        }
+        let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
+        recorder.pose(q, displacement_m, t_s).map_err(record_error)?;
+        self.written += 1;
+        self.last_written = Some(pose.clone());
+        Ok("")
+    }
+}
+
+/// Whether the arm has not moved between two poses, as far as the bands tell.
+fn is_same_stand(before: &SettledPose, now: &SettledPose, criteria: &StillnessCriteria) -> bool {
+    let counts = before.counts_mean.iter().zip(&now.counts_mean).map(|(before, now)| (before - now).abs());
+    counts.fold(0.0, f64::max) <= f64::from(criteria.band_counts)
+        && (before.code_mean - now.code_mean).abs() <= f64::from(criteria.band_codes)
 }

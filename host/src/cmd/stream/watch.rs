@@ -3,6 +3,8 @@
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{Answer, BoardHello, Command, Refusal};
+use miette::Diagnostic;
+use thiserror::Error;
 
 use super::account::Account;
 use super::live::LiveLine;
@@ -10,6 +12,7 @@ use super::{FrameLine, StreamArgs, StreamReport, record_error};
 use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
 use crate::cmd::outcome::CommandError;
 use crate::cmd::port::EndRequest;
+use crate::session::BoardDescription;
 
 /// One run of `stream`.
 pub(super) struct Watch<'a> {
@@ -27,6 +30,17 @@ pub(super) struct Watch<'a> {
 enum Link {
     Up(Box<BoardLink>),
     Lost { hello: Box<BoardHello>, frames: FrameLine },
+}
+
+/// A port that is back, with something else behind it.
+#[derive(Debug, Error, Diagnostic)]
+enum Changed {
+    #[error("{port}: another board is there now: {now}, before {before}")]
+    #[diagnostic(help("What was recorded before is kept. Record the other board in a run of its own."))]
+    Board { port: String, before: String, now: String },
+    #[error("{port}: the board came back with other parameters")]
+    #[diagnostic(help("What was recorded before is kept. Begin another run: joint angles mean something else now."))]
+    Parameters { port: String },
 }
 
 /// The parameters that a board uses, and the frame that they came in.
@@ -83,10 +97,13 @@ impl<'a> Watch<'a> {
         self.line.clear();
         if let Link::Up(link) = &mut self.link {
             // What the board had gathered comes before its answer. A board that is gone by now needs no end.
-            if link.act(Command::StopStream).is_ok() {
-                while let Ok(Some(frame)) = link.next_frame() {
-                    self.account.take(&frame)?;
-                }
+            let _ = link.act(Command::StopStream);
+            let status = link.request(Command::Status);
+            while let Ok(Some(frame)) = link.next_frame() {
+                self.account.take(&frame)?;
+            }
+            if let Ok(Answer::Status(status)) = status {
+                self.account.tally.end(&status);
             }
         }
         let (hello, frames) = match self.link {
@@ -106,6 +123,7 @@ impl<'a> Watch<'a> {
             settled: account.settled,
             tool_poses: account.tool_poses,
             poses_written: account.written,
+            poses_withheld: account.withheld,
             losses: account.tally.losses(),
             frames,
             gaps: account.gaps,
@@ -144,17 +162,37 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Tries the port; a board of another version than before is an error, anything else is waited out.
+    /// Tries the port. A port that is away and a board that is silent are waited out; anything else is an error.
     fn wait_for_port(&mut self) -> Result<(), CommandError> {
         match self.regain() {
             Ok((link, robot)) => {
-                self.line.note(&format!("{}: the board is back", self.args.port.port));
-                self.account.regain(robot)?;
+                self.check_same(link.hello())?;
+                self.account.regain(link.hello_frame(), robot.as_ref())?;
+                let mut note = format!("{}: the board is back", self.args.port.port);
+                if link.hello().uptime_us < self.began.elapsed().as_micros() as u64 {
+                    note += "; it was started anew, so its encoders are NOT HOMED unless somebody has done so since";
+                }
+                self.line.note(&note);
                 self.link = Link::Up(Box::new(link));
                 self.heard = Instant::now();
             }
-            Err(error @ BoardError::OtherVersion { .. }) => return Err(error.into()),
-            Err(_) => std::thread::sleep(RETRY),
+            Err(BoardError::Port(_) | BoardError::Silent { .. } | BoardError::NoReply { .. }) => std::thread::sleep(RETRY),
+            Err(error) => return Err(error.into()),
+        }
+        Ok(())
+    }
+
+    /// What came back is the board that went away, with the parameters that it had.
+    fn check_same(&self, now: &BoardHello) -> Result<(), Changed> {
+        let Link::Lost { hello: before, .. } = &self.link else { return Ok(()) };
+        let port = self.args.port.port.clone();
+        let number = |hello: &BoardHello| BoardDescription::from(hello).unique_id;
+        if before.unique_id != now.unique_id {
+            return Err(Changed::Board { port, before: number(before), now: number(now) });
+        }
+        let crc = |hello: &BoardHello| hello.active.as_ref().map(|active| active.crc);
+        if crc(before) != crc(now) {
+            return Err(Changed::Parameters { port });
         }
         Ok(())
     }

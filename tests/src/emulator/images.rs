@@ -1,0 +1,72 @@
+//! The firmware's images, built as they are shipped.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+/// The boards' target: Cortex-M4F, hard float.
+const TARGET: &str = "thumbv7em-none-eabihf";
+/// Set by `check` when it could not install the target or QEMU, and said so.
+const WITHOUT_BOARD: &str = "BALLBAR_WITHOUT_BOARD";
+
+/// A program for a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Image {
+    /// The firmware of the shipped board.
+    F405,
+    /// The firmware of the emulated board.
+    An386,
+    /// The counter of instructions.
+    An386Counts,
+}
+
+impl Image {
+    /// The image, in ELF. Built when it is asked for first.
+    ///
+    /// # Panics
+    /// When it does not build.
+    pub fn elf(self) -> &'static Path {
+        static F405: LazyLock<PathBuf> = LazyLock::new(|| build("f405", "f405"));
+        static AN386: LazyLock<PathBuf> = LazyLock::new(|| build("an386", "an386"));
+        static AN386_COUNTS: LazyLock<PathBuf> = LazyLock::new(|| build("an386-counts", "an386"));
+        match self {
+            Self::F405 => &F405,
+            Self::An386 => &AN386,
+            Self::An386Counts => &AN386_COUNTS,
+        }
+    }
+}
+
+/// Whether tests of images are to be skipped; says so.
+pub fn is_skipped() -> bool {
+    let is_skipped = std::env::var_os(WITHOUT_BOARD).is_some_and(|value| value == "1");
+    if is_skipped {
+        eprintln!("SKIPPED, as {WITHOUT_BOARD}=1 asks for: this needs the target {TARGET} and qemu-system-arm");
+    }
+    is_skipped
+}
+
+fn build(bin: &str, feature: &str) -> PathBuf {
+    let run = escargot::CargoBuild::new()
+        .package("ballbar-firmware")
+        .bin(bin)
+        .features(feature)
+        .release()
+        .target(TARGET)
+        .target_dir(target_folder())
+        .arg("--locked")
+        .run();
+    match run {
+        Ok(run) => run.path().to_owned(),
+        Err(error) => panic!(
+            "the firmware {bin} does not build: {error}\nWhere the target is missing: rustup target add {TARGET}. Where it \
+             cannot be had, {WITHOUT_BOARD}=1 skips these tests."
+        ),
+    }
+}
+
+/// A folder of its own within the workspace's: cargo, which runs this test, may hold the lock of the latter.
+fn target_folder() -> PathBuf {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace is one folder up");
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), |dir| workspace.join(dir));
+    target.join("board")
+}

@@ -1,0 +1,64 @@
+//! Sets of parameters of different robots and lengths.
+
+use ballbar::wire::ParameterSet;
+use ballbar::{Coupling, Encoder, JointKind, LvdtCurve};
+use heapless::Vec;
+use host_cal::files::Robot;
+
+/// Counts per joint radian of a PUMA 560 and counts per motor turn: gear ratios and encoders as its manual has them.
+const PUMA_ENCODERS: [(f32, u32); 6] =
+    [(-9_965.0, 1_000), (13_728.0, 800), (-8_547.0, 1_000), (12_101.0, 1_000), (11_447.0, 1_000), (12_205.0, 1_000)];
+
+/// A PUMA 560 by its design, with the encoders of the interface board.
+pub fn puma() -> ParameterSet {
+    let chain = Robot::open("puma560").unwrap().chain.cast::<f32>();
+    ParameterSet {
+        name: "PUMA 560".try_into().unwrap(),
+        is_calibrated: false,
+        kinds: chain.joint_kinds().iter().copied().collect(),
+        parameters: chain.parameters().iter().copied().collect(),
+        encoders: PUMA_ENCODERS.map(|(counts_per_unit, counts_per_index)| Encoder { counts_per_unit, counts_per_index }).into(),
+        couplings: Vec::from_slice(&[Coupling { joint: 5, driven_by: 4, ratio: 13.0 / 72.0 }]).unwrap(),
+        lvdt: curve(),
+    }
+}
+
+/// Another set of the same robot.
+pub fn calibrated_puma() -> ParameterSet {
+    let mut set = puma();
+    for (i, value) in set.parameters.iter_mut().enumerate() {
+        *value += 1e-4 * (i as f32 + 1.0);
+    }
+    ParameterSet { name: "PUMA 560, calibrated".try_into().unwrap(), is_calibrated: true, ..set }
+}
+
+/// A short set: two joints.
+pub fn two_joints() -> ParameterSet {
+    let set = puma();
+    ParameterSet {
+        name: "two".try_into().unwrap(),
+        kinds: set.kinds[..2].iter().copied().collect(),
+        parameters: set.parameters[..22].iter().copied().collect(),
+        encoders: set.encoders[..2].iter().copied().collect(),
+        couplings: Vec::new(),
+        ..set
+    }
+}
+
+/// The longest set that there can be: everything full, and every number that varies in size at its largest.
+pub fn largest() -> ParameterSet {
+    ParameterSet {
+        name: "n".repeat(32).as_str().try_into().unwrap(),
+        is_calibrated: true,
+        kinds: core::iter::repeat_n(JointKind::Prismatic, 8).collect(),
+        parameters: core::iter::repeat_n(f32::MIN_POSITIVE, 70).collect(),
+        encoders: core::iter::repeat_n(Encoder { counts_per_unit: -1.5, counts_per_index: u32::MAX }, 8).collect(),
+        couplings: core::iter::repeat_n(Coupling { joint: 7, driven_by: 6, ratio: f32::MAX }, 8).collect(),
+        lvdt: LvdtCurve { code_min: 60_000, code_max: u16::MAX, ..curve() },
+    }
+}
+
+/// 5 mm of travel either side of the middle, a little bent.
+pub fn curve() -> LvdtCurve {
+    LvdtCurve { code_min: 2_000, code_max: 63_500, coefficients_m: [1e-5, 5.0e-3, -2e-6, 3e-5, 1e-6, -4e-6] }
+}
