@@ -3,6 +3,7 @@
 //! | module | holds |
 //! | --- | --- |
 //! | [`board`] | the host's end of the wire: port, requests, losses |
+//! | [`robot_link`] | robot controllers: how a robot is moved, whoever made it |
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
@@ -23,6 +24,7 @@ pub mod identify;
 pub mod kinematics;
 pub mod paper;
 pub mod plan;
+pub mod robot_link;
 pub mod session;
 pub mod simulate;
 pub mod units;

@@ -7,10 +7,11 @@ use ballbar::{JointVector, Kinematics, Sample, SettledPose, Vector3};
 use ballbar_firmware::ENCODERS;
 use host_cal::board::{BAUD, BoardLink, parameter_set};
 use host_cal::files::{Rig, Robot};
+use host_cal::robot_link::JointSpeed;
 use host_cal::session::{LogReader, Record};
 use host_cal::simulate::Shells;
 use host_cal::units::mm_from_m;
-use host_cal::virtual_board::{JointSpeed, Plant, Script};
+use host_cal::virtual_board::{Plant, Script};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -14,7 +14,8 @@ use ballbar::wire::{
 use ballbar_tests::command::{Run, host_cal_in};
 use host_cal::board::{BAUD, BoardLink, Port, RobotOnBoard, nominal_lvdt, parameter_set};
 use host_cal::files::{Rig, Robot};
-use host_cal::virtual_board::{JointSpeed, Pace, Plant, Script, Station, VirtualBoard, VirtualBoardOptions};
+use host_cal::robot_link::JointSpeed;
+use host_cal::virtual_board::{Pace, Plant, Script, Station, VirtualBoard, VirtualBoardOptions};
 use serialport::SerialPort;
 use tempfile::TempDir;
 

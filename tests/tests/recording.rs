@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 use ballbar_tests::command::{Run, host_cal_command, host_cal_in};
 use host_cal::board::parameter_set;
 use host_cal::files::{Rig, Robot};
+use host_cal::robot_link::JointSpeed;
 use host_cal::session::{Description, LogReader, Record};
 use host_cal::simulate::Shells;
-use host_cal::virtual_board::{JointSpeed, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
+use host_cal::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
 use tempfile::TempDir;
 
 const PAIRING: [&str; 4] = ["--pairing", "A:1", "--bar", "460"];

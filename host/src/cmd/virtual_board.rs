@@ -15,9 +15,10 @@ use super::port::EndRequest;
 use super::report::{Report, print, progress};
 use crate::board::{NOMINAL_TRAVEL_M, parameter_set};
 use crate::files::{Rig, Robot};
+use crate::robot_link::JointSpeed;
 use crate::simulate::Shells;
 use crate::units::m_from_mm;
-use crate::virtual_board::{JointSpeed, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
+use crate::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
 
 /// Try everything without hardware: the board's own firmware, with a simulated robot and bar, behind a serial port
 #[derive(Args)]

@@ -39,7 +39,7 @@ use runner::{Runner, Shared};
 
 pub use lvdt::lvdt_curve;
 pub use plant::{COUNTER_WIDTHS, Plant, PlantError, PlantState};
-pub use script::{JointSpeed, Script, Station};
+pub use script::{Script, Station};
 
 /// What a virtual board is made of.
 #[derive(Debug)]

@@ -16,8 +16,9 @@ use thiserror::Error;
 
 use super::lvdt::{code_at, lvdt_curve};
 use super::motion::{Held, Move, Rest, us_from_s};
-use super::script::{JointSpeed, Script, Station};
+use super::script::{Script, Station, move_duration_s};
 use crate::files::{NoEncoders, Robot};
+use crate::robot_link::JointSpeed;
 
 /// Widths of the counters: a PUMA's joints 4 and 6 span more than 16 bits and have the 32-bit ones, as on the real board.
 pub const COUNTER_WIDTHS: [CounterWidth; ENCODERS] = {
@@ -167,7 +168,7 @@ impl Plant {
             self.phase = match &self.phase {
                 Phase::Rest(rest) if rest.until_us <= self.now_us => {
                     let Some(station) = self.waiting.pop_front() else { return };
-                    let duration_us = us_from_s(self.speed.duration_s(&self.kinds, &rest.held.q, &station.q));
+                    let duration_us = us_from_s(move_duration_s(&self.kinds, &self.speed, &rest.held.q, &station.q));
                     Phase::Move(Box::new(Move::new(**rest, station, &self.encoders, duration_us)))
                 }
                 Phase::Move(movement) if movement.until_us <= self.now_us => {

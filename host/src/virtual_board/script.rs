@@ -2,6 +2,7 @@
 
 use ballbar::{JointKind, JointVector, Kinematics, Pairing};
 
+use crate::robot_link::JointSpeed;
 use crate::simulate::{ShellError, Shells};
 
 /// A pose to stand at with the bar attached.
@@ -28,39 +29,14 @@ pub struct Script {
     pub speed: JointSpeed,
 }
 
-/// The highest speed that any joint reaches on a move.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointSpeed {
-    /// Of revolute joints, radians per second.
-    pub revolute_rad_s: f64,
-    /// Of prismatic joints, metres per second.
-    pub prismatic_m_s: f64,
-}
-
 /// No move is shorter, so that a jump of a few counts is no jolt.
 const SHORTEST_MOVE_S: f64 = 0.05;
 /// Highest speed over mean speed of the profile of [`progress`].
 const PEAK_OVER_MEAN: f64 = 1.875;
 
-impl Default for JointSpeed {
-    /// 60 degrees and 0.25 m per second.
-    fn default() -> Self {
-        Self { revolute_rad_s: 60_f64.to_radians(), prismatic_m_s: 0.25 }
-    }
-}
-
-impl JointSpeed {
-    /// Time from one joint vector to another, seconds: that of the joint that needs longest.
-    pub(super) fn duration_s(&self, kinds: &[JointKind], from: &JointVector<f64>, to: &JointVector<f64>) -> f64 {
-        let alone_s = |((kind, from), to): ((&JointKind, &f64), &f64)| {
-            let speed = match kind {
-                JointKind::Revolute => self.revolute_rad_s,
-                JointKind::Prismatic => self.prismatic_m_s,
-            };
-            (to - from).abs() * PEAK_OVER_MEAN / speed
-        };
-        kinds.iter().zip(from.as_array()).zip(to.as_array()).map(alone_s).fold(SHORTEST_MOVE_S, f64::max)
-    }
+/// Time of a move, seconds.
+pub(super) fn move_duration_s(kinds: &[JointKind], speed: &JointSpeed, from: &JointVector<f64>, to: &JointVector<f64>) -> f64 {
+    (speed.duration_s(kinds, from, to) * PEAK_OVER_MEAN).max(SHORTEST_MOVE_S)
 }
 
 /// Share of the way, 0 to 1, at a share of the time: `10 τ³ − 15 τ⁴ + 6 τ⁵`, which begins and ends without a jerk.

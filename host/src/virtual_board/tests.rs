@@ -13,6 +13,7 @@ use serialport::SerialPort;
 use super::*;
 use crate::board::parameter_set;
 use crate::files::{Rig, Robot};
+use crate::robot_link::JointSpeed;
 use crate::simulate::Shells;
 
 /// Far longer than anything here takes.

@@ -9,9 +9,10 @@ use crate::board::{BAUD, BoardLink, NOMINAL_TRAVEL_M, RobotOnBoard, StreamLosses
 use crate::cmd::outcome::CommandError;
 use crate::cmd::report::progress;
 use crate::files::{PairingId, Rig, Robot, pose_header, pose_record};
+use crate::robot_link::JointSpeed;
 use crate::simulate::Shells;
 use crate::units::m_from_mm;
-use crate::virtual_board::{JointSpeed, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
+use crate::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
 
 /// What the demo is about: a robot as its controller believes it to be and as it is, and where the bar can be attached.
 pub(super) struct Scene {
