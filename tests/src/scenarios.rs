@@ -266,7 +266,7 @@ impl Recording {
             for (found, held) in encoders.counts(&found).iter().zip(held) {
                 assert!((found - held).abs() < 0.5, "{row:?}: {found} counts, the robot stood at {held}");
             }
-            let length_mm = mm_from_m(truth.length(&q, &station.pairing));
+            let length_mm = mm_from_m(truth.length(&q, &station.bar.expect("the bar is attached").pairing));
             let found_mm: f64 = row[8].parse().expect("a number");
             assert!((found_mm - length_mm).abs() <= mm_from_m(CODE_M), "{row:?}, expected {length_mm} mm");
         }

@@ -15,7 +15,7 @@ use ballbar_tests::command::{Run, host_cal_in};
 use host_cal::board::{BAUD, BoardLink, Port, RobotOnBoard, nominal_lvdt, parameter_set};
 use host_cal::files::{Rig, Robot};
 use host_cal::robot_link::JointSpeed;
-use host_cal::virtual_board::{Pace, Plant, Script, Station, VirtualBoard, VirtualBoardOptions};
+use host_cal::virtual_board::{AttachedBar, Pace, Plant, Script, Station, VirtualBoard, VirtualBoardOptions};
 use serialport::SerialPort;
 use tempfile::TempDir;
 
@@ -152,9 +152,10 @@ fn lvdt_finds_the_curve_of_the_simulated_lvdt_from_known_lengths() {
     // The arm stands; a micrometer sets the bar. Seen from the board, the length is off by as much.
     let q = JointVector::zero();
     let pairing = rig.pairing(rig.all_pairings()[0]);
-    let bar_m = ballbar::Kinematics::new(&truth.chain).length(&q, &pairing);
+    let mid_m = ballbar::Kinematics::new(&truth.chain).length(&q, &pairing);
+    let bar = Some(AttachedBar { pairing, mid_m });
     let offsets_mm = [-35.0, -25.0, -15.0, -5.0, 5.0, 15.0, 25.0, 35.0];
-    let station = |&mm: &f64| Station { q, pairing, bar_m, dwell_s: 0.9, length_error_m: mm / 1e3 };
+    let station = |&mm: &f64| Station { q, bar, dwell_s: 0.9, length_error_m: mm / 1e3 };
     let stations = offsets_mm.iter().map(station).collect();
     board.play_with_stream(Script { stations, speed: JointSpeed::default() });
 

@@ -7,18 +7,22 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
+use miette::Diagnostic;
 use serde::Serialize;
+use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
 use super::port::EndRequest;
 use super::report::{Report, print, progress};
 use crate::board::{NOMINAL_TRAVEL_M, parameter_set};
-use crate::files::{Rig, Robot};
+use crate::files::{PairingId, Rig, Robot};
 use crate::robot_link::JointSpeed;
 use crate::simulate::Shells;
 use crate::units::m_from_mm;
-use crate::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
+use crate::virtual_board::{
+    Controller, ControllerOptions, Driven, Driver, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions, driver,
+};
 
 /// Try everything without hardware: the board's own firmware, with a simulated robot and bar, behind a serial port
 #[derive(Args)]
@@ -78,6 +82,16 @@ pub(super) struct VirtualBoardArgs {
     /// End when the last pose was taken and the host has read all
     #[arg(long)]
     once: bool,
+    /// Let `collect --robot-link sim` drive the robot: listen at this address, as 127.0.0.1:0; the second line on stdout is
+    /// where. No poses are planned then
+    #[arg(long, value_name = "ADDRESS", conflicts_with_all = ["at_once", "once", "per_pair", "pairings", "speed_deg_s"])]
+    controller: Option<String>,
+    /// Play of every revolute joint, from end to end, degrees
+    #[arg(long, default_value_t = 0.0, value_name = "DEG", allow_hyphen_values = true)]
+    backlash_deg: f64,
+    /// The LVDT shows every length so much later, milliseconds
+    #[arg(long, default_value_t = 0.0, value_name = "MS", allow_hyphen_values = true)]
+    lvdt_lag_ms: f64,
     /// Flip one bit in every N bytes to the host
     #[arg(long, value_name = "N")]
     bit_errors: Option<NonZeroU64>,
@@ -110,8 +124,21 @@ struct VirtualBoardReport {
     poses: usize,
     dwell_s: f64,
     sigma_mm: f64,
+    backlash_deg: f64,
+    lvdt_lag_ms: f64,
     seed: u64,
     ready: bool,
+    /// Where `--robot-link sim` finds the robot's controller.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    controller: Option<String>,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+#[error("--controller {address}: cannot be listened at: {error}")]
+#[diagnostic(help("Give an address of this machine with a free port; port 0 takes any: 127.0.0.1:0"))]
+struct ControllerError {
+    address: String,
+    error: std::io::Error,
 }
 
 /// Time between two looks at the board.
@@ -128,11 +155,51 @@ impl VirtualBoardArgs {
         if truth.chain.joint_kinds() != design.chain.joint_kinds() {
             return refuse("--design", design.name.clone(), "a robot with the same joints as --robot");
         }
+        let script = match self.controller {
+            Some(_) => None,
+            None => Some(self.script(&truth, &design, &rig, &pairings)?),
+        };
+
+        let end = EndRequest::listen();
+        let (driver, driven) = driver();
+        let mut board = self.power_up(&truth, &design, &rig, driven)?;
+        let controller = match &self.controller {
+            Some(address) => Some(self.listen(address, driver, &truth, &rig)?),
+            None => None,
+        };
+        let report = VirtualBoardReport {
+            port: board.port().to_owned(),
+            robot: truth.name.clone(),
+            design: design.name.clone(),
+            pairings: pairings.iter().map(|&pairing| rig.pairing_name(pairing)).collect(),
+            bar_mm: self.bar,
+            poses: script.as_ref().map_or(0, |script| script.stations.len()),
+            dwell_s: self.dwell_s,
+            sigma_mm: self.sigma_mm,
+            backlash_deg: self.backlash_deg,
+            lvdt_lag_ms: self.lvdt_lag_ms,
+            seed: self.seed,
+            ready: self.ready,
+            controller: controller.map(|controller| controller.address().to_string()),
+        };
+        print(&report, self.output.json)?;
+        say(&self.explanation(&report));
+        match script {
+            Some(script) if self.at_once => board.play(script),
+            Some(script) => board.play_with_stream(script),
+            None => {}
+        }
+        self.wait(&board, &end);
+        Ok(Outcome::Good)
+    }
+
+    /// Poses on the shells of the pairings.
+    fn script(&self, truth: &Robot, design: &Robot, rig: &Rig, pairings: &[PairingId]) -> Result<Script, CommandError> {
         let shells = Shells {
-            planned_with: &design,
-            truth: &truth,
-            rig: &rig,
-            pairings: &pairings,
+            planned_with: design,
+            truth,
+            rig,
+            pairings,
             bar_m: m_from_mm(self.bar),
             per_pairing: self.per_pair as usize,
             sigma_m: m_from_mm(self.sigma_mm),
@@ -142,30 +209,18 @@ impl VirtualBoardArgs {
         let bar = progress((pairings.len() * shells.per_pairing) as u64, "planning poses");
         let script = Script::from_shells(&shells, self.dwell_s, speed, || bar.inc(1))?;
         bar.finish_and_clear();
+        Ok(script)
+    }
 
-        let end = EndRequest::listen();
-        let mut board = self.power_up(&truth, &design, &rig)?;
-        let report = VirtualBoardReport {
-            port: board.port().to_owned(),
-            robot: truth.name.clone(),
-            design: design.name.clone(),
-            pairings: pairings.iter().map(|&pairing| rig.pairing_name(pairing)).collect(),
-            bar_mm: self.bar,
-            poses: script.stations.len(),
+    fn listen(&self, address: &str, driver: Driver, truth: &Robot, rig: &Rig) -> Result<Controller, CommandError> {
+        let options = ControllerOptions {
+            sigma_m: m_from_mm(self.sigma_mm),
             dwell_s: self.dwell_s,
-            sigma_mm: self.sigma_mm,
             seed: self.seed,
-            ready: self.ready,
+            ..ControllerOptions::new(truth, rig)
         };
-        print(&report, self.output.json)?;
-        say(&self.explanation(&report));
-        if self.at_once {
-            board.play(script);
-        } else {
-            board.play_with_stream(script);
-        }
-        self.wait(&board, &end);
-        Ok(Outcome::Good)
+        let refused = |error| ControllerError { address: address.to_owned(), error };
+        Ok(Controller::listen(address, driver, options).map_err(refused)?)
     }
 
     fn check(&self) -> Result<(), CommandError> {
@@ -182,12 +237,20 @@ impl VirtualBoardArgs {
         if !(0.0..=1e6).contains(&self.sigma_mm) {
             return refuse("--sigma-mm", self.sigma_mm.to_string(), "a number from 0 to 1e6");
         }
+        if !(0.0..=10.0).contains(&self.backlash_deg) {
+            return refuse("--backlash-deg", self.backlash_deg.to_string(), "a number from 0 to 10");
+        }
+        if !(0.0..=1000.0).contains(&self.lvdt_lag_ms) {
+            return refuse("--lvdt-lag-ms", self.lvdt_lag_ms.to_string(), "a number from 0 to 1000");
+        }
         Ok(())
     }
 
-    fn power_up(&self, truth: &Robot, design: &Robot, rig: &Rig) -> Result<VirtualBoard, CommandError> {
+    fn power_up(&self, truth: &Robot, design: &Robot, rig: &Rig, driven: Driven) -> Result<VirtualBoard, CommandError> {
         let travel_m = rig.bar.as_ref().map_or(NOMINAL_TRAVEL_M, |bar| bar.travel_m);
-        let plant = Plant::new(truth, travel_m, self.seed)?;
+        let plant = Plant::new(truth, travel_m, self.seed)?
+            .with_backlash(self.backlash_deg.to_radians())
+            .with_lvdt_lag(Duration::from_secs_f64(self.lvdt_lag_ms * 1e-3));
         let parameters = if self.ready { Some(parameter_set(design, plant.lvdt())?) } else { None };
         let options = VirtualBoardOptions {
             parameters,
@@ -195,6 +258,7 @@ impl VirtualBoardArgs {
             flash_file: self.flash.clone(),
             port_name: self.port.clone(),
             bit_errors: self.bit_errors,
+            driven: self.controller.is_some().then_some(driven),
             ..VirtualBoardOptions::new(plant, self.pace.into())
         };
         Ok(VirtualBoard::start(options)?)
@@ -206,6 +270,13 @@ impl VirtualBoardArgs {
         } else {
             "It holds no parameters unless its flash does, and its encoders are not homed."
         };
+        if let Some(controller) = &report.controller {
+            return format!(
+                "A board with a simulated {}. {state}\nIts robot's controller listens at {controller}.\n\
+                 Try: host-cal collect {} --robot-link sim --robot-address {controller} …\nCtrl-C ends it.\n",
+                report.robot, report.port
+            );
+        }
         let begin = if self.at_once { "The robot moves." } else { "The robot moves when a host streams." };
         format!(
             "A board with a simulated {}, planned as {}: {} poses on {} of {} mm, {} s at each. {begin}\n{state}\n\
@@ -252,7 +323,8 @@ impl VirtualBoardArgs {
 
 impl Report for VirtualBoardReport {
     fn text(&self) -> String {
-        format!("{}\n", self.port)
+        let controller = self.controller.as_ref().map_or(String::new(), |controller| format!("{controller}\n"));
+        format!("{}\n{controller}", self.port)
     }
 }
 

@@ -7,11 +7,14 @@
 //!
 //! The robot, the bar and the wiring are simulated; all that the host talks to is the code that runs on a board.
 
+mod controller;
+mod driver;
 mod flash_file;
 mod lvdt;
 mod machine;
 mod motion;
 mod plant;
+mod play;
 mod pty;
 mod runner;
 mod script;
@@ -37,9 +40,11 @@ use machine::{BitErrors, Machine};
 use pty::Pty;
 use runner::{Runner, Shared};
 
+pub use controller::{Controller, ControllerOptions};
+pub use driver::{Driven, Driver, Order, Stance, driver};
 pub use lvdt::lvdt_curve;
 pub use plant::{COUNTER_WIDTHS, Plant, PlantError, PlantState};
-pub use script::{Script, Station};
+pub use script::{AttachedBar, Script, Station};
 
 /// What a virtual board is made of.
 #[derive(Debug)]
@@ -58,12 +63,14 @@ pub struct VirtualBoardOptions {
     pub port_name: Option<PathBuf>,
     /// One bit is flipped every so many bytes to the host.
     pub bit_errors: Option<NonZeroU64>,
+    /// Who drives the robot besides the scripts.
+    pub driven: Option<Driven>,
 }
 
 impl VirtualBoardOptions {
     /// A board as it comes from the shelf, at this plant and pace: nothing in flash, nothing homed, a sound line.
     pub fn new(plant: Plant, pace: Pace) -> Self {
-        Self { plant, pace, parameters: None, is_homed: false, flash_file: None, port_name: None, bit_errors: None }
+        Self { plant, pace, parameters: None, is_homed: false, flash_file: None, port_name: None, bit_errors: None, driven: None }
     }
 }
 
@@ -138,6 +145,7 @@ impl VirtualBoard {
         let shared = Arc::new(Shared::default());
         let (plays, plays_taken) = channel();
         let mut runner = Runner::new(options.plant, pty, options.pace, plays_taken, Arc::clone(&shared));
+        runner.driven = options.driven;
         runner.bit_errors = options.bit_errors.map(|every| BitErrors::new(every.get(), Arc::clone(&shared.flips)));
         let machine = Machine::new(flash);
         let thread = std::thread::Builder::new()

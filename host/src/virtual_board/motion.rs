@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use ballbar::{JointEncoders, JointVector, Kinematics, MAX_JOINTS};
+use ballbar::{JointEncoders, JointVector, MAX_JOINTS};
 use ballbar_firmware::ENCODERS;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::script::{Station, progress};
+use super::script::{AttachedBar, Station, progress};
 
 /// Ringing of the arm when it has arrived.
 const RING_HZ: f64 = 12.0;
@@ -31,10 +31,9 @@ pub(super) struct Held {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rest {
     pub(super) held: Held,
-    /// Where the robot measures; none before the first station.
-    station: Option<Station>,
-    /// Displacement of the bar from mid travel, metres.
-    displacement_m: f64,
+    pub(super) bar: Option<AttachedBar>,
+    /// What the bar measures too much here, metres.
+    length_error_m: f64,
     ring_counts: [f64; ENCODERS],
     ring_length_m: f64,
     since_us: u64,
@@ -51,6 +50,18 @@ pub(super) struct Move {
     pub(super) until_us: u64,
 }
 
+/// Where the robot is at one moment.
+pub(super) struct Moment {
+    /// Positions of the encoders.
+    pub(super) counts: [i32; ENCODERS],
+    /// Encoder outputs that the servos hold, radians or metres, not rounded to counts while the robot moves.
+    pub(super) q: JointVector<f64>,
+    /// The bar, where it is attached.
+    pub(super) bar: Option<AttachedBar>,
+    /// What the bar measures too much, metres.
+    pub(super) length_error_m: f64,
+}
+
 impl Held {
     /// At the whole counts nearest to these encoder outputs.
     pub(super) fn new(encoders: &JointEncoders<f64>, q: &JointVector<f64>) -> Self {
@@ -62,24 +73,19 @@ impl Held {
 impl Rest {
     /// At power-up, with the bar not attached, until the first station.
     pub(super) fn at_start(held: Held) -> Self {
-        Self {
-            held,
-            station: None,
-            displacement_m: 0.0,
-            ring_counts: [0.0; ENCODERS],
-            ring_length_m: 0.0,
-            since_us: 0,
-            until_us: 0,
-        }
+        Self { held, bar: None, length_error_m: 0.0, ring_counts: [0.0; ENCODERS], ring_length_m: 0.0, since_us: 0, until_us: 0 }
     }
 
-    /// Counts, and displacement of the bar from mid travel in metres where it is attached.
-    pub(super) fn at(&self, t_us: u64) -> ([i32; ENCODERS], Option<f64>) {
+    pub(super) fn at(&self, t_us: u64) -> Moment {
         let since_s = t_us.saturating_sub(self.since_us) as f64 * 1e-6;
         let decay = since_s / RING_TIME_CONSTANT_S;
         let ring = if decay < RING_TIME_CONSTANTS { (-decay).exp() * (TAU * RING_HZ * since_s).sin() } else { 0.0 };
-        let displacement_m = self.station.map(|_| self.displacement_m + ring * self.ring_length_m);
-        (whole(&self.held.counts, &self.ring_counts.map(|counts| counts * ring)), displacement_m)
+        Moment {
+            counts: whole(&self.held.counts, &self.ring_counts.map(|counts| counts * ring)),
+            q: self.held.q,
+            bar: self.bar,
+            length_error_m: self.length_error_m + ring * self.ring_length_m,
+        }
     }
 }
 
@@ -90,29 +96,31 @@ impl Move {
         Self { from, to, held, since_us: from.until_us, until_us: from.until_us + duration_us }
     }
 
-    /// Counts, and displacement of the bar from mid travel in metres where it is attached.
-    pub(super) fn at(&self, t_us: u64, truth: &Kinematics<f64>) -> ([i32; ENCODERS], Option<f64>) {
+    pub(super) fn at(&self, t_us: u64) -> Moment {
         let way = progress((t_us - self.since_us) as f64 / (self.until_us - self.since_us) as f64);
+        let mut q = self.held.q;
+        for (q, from) in q.as_array_mut().iter_mut().zip(self.from.held.q.as_array()) {
+            *q = between(*from, *q, way);
+        }
         // Counts are linear in q, couplings included.
         let counts = std::array::from_fn(|i| between(self.from.held.counts[i], self.held.counts[i], way));
-        let displacement_m = self.attached_from().map(|from| {
-            let mut q = self.held.q;
-            for (q, from) in q.as_array_mut().iter_mut().zip(self.from.held.q.as_array()) {
-                *q = between(*from, *q, way);
-            }
-            let error_m = between(from.length_error_m, self.to.length_error_m, way);
-            truth.length(&q, &self.to.pairing) + error_m - self.to.bar_m
-        });
-        (whole(&counts, &[0.0; ENCODERS]), displacement_m)
+        Moment {
+            counts: whole(&counts, &[0.0; ENCODERS]),
+            q,
+            bar: self.to.bar.filter(|bar| self.from.bar.as_ref() == Some(bar)),
+            length_error_m: between(self.from.length_error_m, self.to.length_error_m, way),
+        }
     }
 
-    /// The station before, when the bar stays where it is on the way.
-    fn attached_from(&self) -> Option<Station> {
-        self.from.station.filter(|from| from.pairing == self.to.pairing && from.bar_m == self.to.bar_m)
+    /// The same move, ending where the robot is at a time on the way.
+    pub(super) fn halted(&self, t_us: u64, encoders: &JointEncoders<f64>) -> Self {
+        let now = self.at(t_us);
+        let to = Station { q: now.q, bar: now.bar, dwell_s: 0.0, length_error_m: now.length_error_m };
+        Self { to, held: Held::new(encoders, &now.q), until_us: t_us, ..*self }
     }
 
     /// Standing at the station, after a move that is over.
-    pub(super) fn arrive(&self, truth: &Kinematics<f64>, rng: &mut ChaCha8Rng) -> Rest {
+    pub(super) fn arrive(&self, rng: &mut ChaCha8Rng) -> Rest {
         let station = self.to;
         // Joints that did not move are not shaken either; that holds for the encoders beyond the robot's joints as well.
         let ring_counts = std::array::from_fn(|i| {
@@ -121,8 +129,8 @@ impl Move {
         });
         Rest {
             held: self.held,
-            station: Some(station),
-            displacement_m: truth.length(&self.held.q, &station.pairing) + station.length_error_m - station.bar_m,
+            bar: station.bar,
+            length_error_m: station.length_error_m,
             ring_counts,
             ring_length_m: if rng.random() { RING_LENGTH_M } else { -RING_LENGTH_M },
             since_us: self.until_us,

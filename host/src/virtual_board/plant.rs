@@ -5,6 +5,7 @@
 //! Nothing here knows of a board, so that boards of any kind can be fed with it.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use ballbar::{CounterWidth, JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve};
 use ballbar_firmware::{ENCODERS, EncoderLatch, LvdtScan};
@@ -15,8 +16,9 @@ use rand_distr::{Distribution, StandardNormal};
 use thiserror::Error;
 
 use super::lvdt::{code_at, lvdt_curve};
-use super::motion::{Held, Move, Rest, us_from_s};
-use super::script::{Script, Station, move_duration_s};
+use super::motion::{Held, Moment, Move, Rest, us_from_s};
+use super::play::{Backlash, Lag};
+use super::script::{AttachedBar, Script, Station, move_duration_s};
 use crate::files::{NoEncoders, Robot};
 use crate::robot_link::JointSpeed;
 
@@ -45,6 +47,8 @@ pub struct Plant {
     phase: Phase,
     waiting: VecDeque<Station>,
     speed: JointSpeed,
+    backlash: Backlash,
+    lvdt_lag: Lag,
     now_us: u64,
     scripts: u64,
     rng: ChaCha8Rng,
@@ -98,7 +102,7 @@ impl Plant {
             *q = 0_f64.clamp(limits.min, limits.max);
         }
         let rest = Rest::at_start(Held::new(&encoders, &q));
-        let (start_counts, _) = rest.at(0);
+        let start_counts = rest.at(0).counts;
         Ok(Self {
             truth: Kinematics::new(&truth.chain),
             kinds: truth.chain.joint_kinds().to_vec(),
@@ -109,10 +113,28 @@ impl Plant {
             phase: Phase::Rest(Box::new(rest)),
             waiting: VecDeque::new(),
             speed: JointSpeed::default(),
+            backlash: Backlash::none(&q),
+            lvdt_lag: Lag::default(),
             now_us: 0,
             scripts: 0,
             rng: ChaCha8Rng::seed_from_u64(seed),
         })
+    }
+
+    /// The same robot with play in its revolute joints: from one end of it to the other, radians of the joint.
+    #[must_use]
+    pub fn with_backlash(mut self, play_rad: f64) -> Self {
+        for (half, kind) in self.backlash.half.iter_mut().zip(&self.kinds) {
+            *half = if *kind == JointKind::Revolute { play_rad / 2.0 } else { 0.0 };
+        }
+        self
+    }
+
+    /// The same bar with an LVDT that shows every length so much later.
+    #[must_use]
+    pub fn with_lvdt_lag(mut self, lag: Duration) -> Self {
+        self.lvdt_lag.us = lag.as_micros() as u64;
+        self
     }
 
     /// The true curve of the LVDT.
@@ -146,20 +168,50 @@ impl Plant {
         }
     }
 
+    /// Stops where the robot is, and forgets what is left of a script.
+    pub fn halt(&mut self) {
+        self.waiting.clear();
+        match &mut self.phase {
+            Phase::Rest(rest) => rest.until_us = rest.until_us.min(self.now_us),
+            Phase::Move(movement) if movement.until_us > self.now_us => {
+                **movement = movement.halted(self.now_us, &self.encoders);
+            }
+            Phase::Move(_) => {}
+        }
+    }
+
     /// Whether the last station's time was over at the latest call of [`Plant::at`]. The robot then stays there.
     pub fn is_done(&self) -> bool {
         self.waiting.is_empty() && matches!(&self.phase, Phase::Rest(rest) if rest.until_us <= self.now_us)
+    }
+
+    /// Whether the robot moved, or had a station before it, at the latest call of [`Plant::at`].
+    pub fn is_moving(&self) -> bool {
+        !self.waiting.is_empty() || matches!(self.phase, Phase::Move(_))
+    }
+
+    /// Encoder outputs at the latest call of [`Plant::at`], as the servos hold them, and the bar that was attached.
+    pub fn stance(&self) -> (JointVector<f64>, Option<AttachedBar>) {
+        let now = self.moment();
+        (now.q, now.bar)
     }
 
     /// The inputs at a time in microseconds, which must not fall from call to call.
     pub fn at(&mut self, t_us: u64) -> PlantState {
         self.now_us = t_us;
         self.go_on();
-        let (counts, displacement_m) = match &self.phase {
-            Phase::Rest(rest) => rest.at(t_us),
-            Phase::Move(movement) => movement.at(t_us, &self.truth),
-        };
-        PlantState { latch: self.latch(counts), scan: self.scan(displacement_m) }
+        let now = self.moment();
+        let joint_q = self.backlash.follow(&now.q);
+        let displacement_m = now.bar.map(|bar| self.truth.length(&joint_q, &bar.pairing) + now.length_error_m - bar.mid_m);
+        let shown_m = self.lvdt_lag.pass(t_us, displacement_m);
+        PlantState { latch: self.latch(now.counts), scan: self.scan(shown_m) }
+    }
+
+    fn moment(&self) -> Moment {
+        match &self.phase {
+            Phase::Rest(rest) => rest.at(self.now_us),
+            Phase::Move(movement) => movement.at(self.now_us),
+        }
     }
 
     /// Ends the phases that are over.
@@ -172,7 +224,7 @@ impl Plant {
                     Phase::Move(Box::new(Move::new(**rest, station, &self.encoders, duration_us)))
                 }
                 Phase::Move(movement) if movement.until_us <= self.now_us => {
-                    Phase::Rest(Box::new(movement.arrive(&self.truth, &mut self.rng)))
+                    Phase::Rest(Box::new(movement.arrive(&mut self.rng)))
                 }
                 _ => return,
             };
@@ -295,7 +347,7 @@ mod tests {
             let mean = (0..codes).map(|i| f64::from(plant.at(t_us + i).scan.code)).sum::<f64>() / codes as f64;
             let length_m = 0.46 + plant.lvdt().displacement_of_code_m::<f64>(mean).unwrap();
             let q = encoders.q(plant.counts().iter().map(|&counts| f64::from(counts)));
-            let expected_m = truth.length(&q, &station.pairing) + station.length_error_m;
+            let expected_m = truth.length(&q, &station.bar.unwrap().pairing) + station.length_error_m;
             assert!((length_m - expected_m).abs() < 0.5e-6, "{length_m} for {expected_m}");
         }
     }
@@ -378,7 +430,8 @@ mod tests {
         let mut plant = plant();
         let q = JointVector::zero();
         let pairing = Pairing { chuck_base_m: Vector3::zeros(), sphere_tool_m: Vector3::zeros() };
-        let station = Station { q, pairing, bar_m: 1.0, dwell_s: 100.0, length_error_m: 0.0 };
+        let bar = Some(AttachedBar { pairing, mid_m: 1.0 });
+        let station = Station { q, bar, dwell_s: 100.0, length_error_m: 0.0 };
         let script = |dwell_s| Script { stations: vec![Station { dwell_s, ..station }], speed: JointSpeed::default() };
         assert!(plant.is_done());
         plant.play(script(100.0));

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use ballbar::wire::{Command, HostHello, MAX_FRAME, PROTOCOL, ProtocolVersion, Request, ResetReason, ToBoard, encode};
 use ballbar_firmware::{Board, SampleQueue, Sampler};
 
+use super::driver::Driven;
 use super::machine::{BitErrors, Clock, Converter, Encoders, Machine};
 use super::plant::{Plant, PlantState};
 use super::pty::Pty;
@@ -42,6 +43,8 @@ pub(super) struct Runner {
     pub(super) pace: Pace,
     pub(super) plays: Receiver<Play>,
     pub(super) shared: Arc<Shared>,
+    /// Who drives the robot besides the scripts.
+    pub(super) driven: Option<Driven>,
     /// Goes into the link once the board is ready.
     pub(super) bit_errors: Option<BitErrors>,
     /// A script that waits for the host to stream.
@@ -55,7 +58,19 @@ pub(super) struct Runner {
 
 impl Runner {
     pub(super) fn new(plant: Plant, pty: Pty, pace: Pace, plays: Receiver<Play>, shared: Arc<Shared>) -> Self {
-        Self { plant, pty, pace, plays, shared, bit_errors: None, held: None, scripts_begun: 0, now_ns: 0, anchor: None }
+        Self {
+            plant,
+            pty,
+            pace,
+            plays,
+            shared,
+            driven: None,
+            bit_errors: None,
+            held: None,
+            scripts_begun: 0,
+            now_ns: 0,
+            anchor: None,
+        }
     }
 
     /// Runs the board until it is stopped, over any number of resets. At power-up, and not after a reset, the encoders are preset
@@ -117,6 +132,9 @@ impl Runner {
     /// Some ticks, then a look at the port, then a rest where there is time for one.
     fn turn(&mut self, powered: &mut Powered<'_>) {
         self.take_plays(powered);
+        if let Some(driven) = &self.driven {
+            driven.attend(&mut self.plant);
+        }
         // Without this, a time that stands still would leave the host's requests unread.
         powered.board.poll();
         if self.pace == Pace::Free && !self.plant.is_done() {

@@ -5,19 +5,26 @@ use ballbar::{JointKind, JointVector, Kinematics, Pairing};
 use crate::robot_link::JointSpeed;
 use crate::simulate::{ShellError, Shells};
 
-/// A pose to stand at with the bar attached.
+/// A pose to stand at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
     /// Encoder outputs, radians or metres. The servos hold the nearest whole counts.
     pub q: JointVector<f64>,
-    /// The bar's two ends.
-    pub pairing: Pairing<f64>,
-    /// Length of the bar at mid travel, metres.
-    pub bar_m: f64,
+    /// What is attached there; another bar than at the station before is off on the way. `None` where no bar is attached.
+    pub bar: Option<AttachedBar>,
     /// How long the robot stands there, seconds.
     pub dwell_s: f64,
     /// What the bar measures too much here, metres: play of the chucks and all else that a fit sees as noise.
     pub length_error_m: f64,
+}
+
+/// A bar between a chuck and a sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AttachedBar {
+    /// The bar's two ends.
+    pub pairing: Pairing<f64>,
+    /// Its length at mid travel, metres.
+    pub mid_m: f64,
 }
 
 /// Stations in their order.
@@ -57,8 +64,7 @@ impl Script {
             let measurement = pose.row.measurement;
             Station {
                 q: measurement.q,
-                pairing: measurement.pairing,
-                bar_m: shells.bar_m,
+                bar: Some(AttachedBar { pairing: measurement.pairing, mid_m: shells.bar_m }),
                 dwell_s,
                 length_error_m: measurement.length_m - truth.length(&measurement.q, &measurement.pairing),
             }

@@ -144,8 +144,9 @@ fn every_station_settles_at_its_pose_and_length() {
             assert!((mean - expected).abs() < 1.0, "{mean} for {expected}");
         }
         let held = encoders.counts(&station.q).map(f64::round);
-        let length_m = kinematics.length(&encoders.q(held), &station.pairing) + station.length_error_m;
-        let expected = lvdt::code_at(&curve, length_m - station.bar_m).unwrap();
+        let bar = station.bar.unwrap();
+        let length_m = kinematics.length(&encoders.q(held), &bar.pairing) + station.length_error_m;
+        let expected = lvdt::code_at(&curve, length_m - bar.mid_m).unwrap();
         assert!((pose.code_mean - expected).abs() < 3.0, "{} for {expected}", pose.code_mean);
     }
     let began = Instant::now();

@@ -111,7 +111,7 @@ impl<'a> Bench<'a> {
             }
             let displacement_m = displacement_m.ok_or(BenchError::BeyondTravel(number))?;
             let (chuck, sphere) = (&rig.chucks[pairing.chuck].name, &rig.spheres[pairing.sphere].name);
-            csv += &(pose_record(chuck, sphere, &kinds, &q, station.bar_m + displacement_m, &[]) + "\n");
+            csv += &(pose_record(chuck, sphere, &kinds, &q, shells.bar_m + displacement_m, &[]) + "\n");
             bar.inc(1);
         }
         bar.finish_and_clear();

@@ -1,0 +1,202 @@
+//! The simulated robot's controller, and the hand that attaches the bar to it: lines of JSON over TCP.
+//!
+//! It is the controller of `host-cal virtual-board --controller ADDRESS`, which answers every [`SimRequest`] with a [`SimReply`].
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+
+use ballbar::JointVector;
+use serde::{Deserialize, Serialize};
+
+use super::{JointSpeed, LinkError, MoveState, RobotLink};
+
+/// What the controller is asked. SI units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SimRequest {
+    /// Go to encoder outputs by joint interpolation.
+    Move {
+        /// Radians or metres, one a joint.
+        q: Vec<f64>,
+        /// The highest speed of revolute joints, radians per second.
+        revolute_rad_s: f64,
+        /// The highest speed of prismatic joints, metres per second.
+        prismatic_m_s: f64,
+    },
+    /// How does the latest move stand?
+    State,
+    /// Stop on the way.
+    Halt,
+    /// Attach the bar between two points, `mid_m` long at mid travel.
+    Attach {
+        /// Name of the chuck.
+        chuck: String,
+        /// Name of the sphere.
+        sphere: String,
+        /// Metres.
+        mid_m: f64,
+    },
+    /// Take the bar off.
+    Detach,
+}
+
+/// What the controller answers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SimReply {
+    /// It is done, or begun.
+    Done,
+    /// It is not done.
+    Refused(String),
+    /// Where the robot is.
+    State {
+        /// Whether the latest move is under way.
+        is_moving: bool,
+        /// Radians or metres, one a joint.
+        q: Vec<f64>,
+    },
+}
+
+/// A connection to the controller.
+pub struct SimClient {
+    address: String,
+    lines: BufReader<TcpStream>,
+}
+
+/// How long the controller may take to answer.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// A reply is far shorter.
+const LONGEST_REPLY: u64 = 4_096;
+
+impl SimClient {
+    /// Connects.
+    ///
+    /// # Errors
+    /// [`LinkError::Unreachable`].
+    pub fn connect(address: &str) -> Result<Self, LinkError> {
+        let unreachable = |reason: String| LinkError::Unreachable { address: address.to_owned(), reason };
+        let mut addresses = address.to_socket_addrs().map_err(|error| unreachable(error.to_string()))?;
+        let first = addresses.next().ok_or_else(|| unreachable("the name has no address".into()))?;
+        let stream = TcpStream::connect_timeout(&first, PATIENCE).map_err(|error| unreachable(error.to_string()))?;
+        let prepared = stream.set_read_timeout(Some(PATIENCE)).and_then(|()| stream.set_nodelay(true));
+        prepared.map_err(|error| unreachable(error.to_string()))?;
+        Ok(Self { address: address.to_owned(), lines: BufReader::new(stream) })
+    }
+
+    /// Asks, and waits for the answer.
+    ///
+    /// # Errors
+    /// [`LinkError`] when the connection is gone, or something else is at its other end.
+    pub fn ask(&mut self, request: &SimRequest) -> Result<SimReply, LinkError> {
+        let lost = |reason: String| LinkError::Lost { address: self.address.clone(), reason };
+        let mut line = serde_json::to_string(request).map_err(|error| lost(error.to_string()))?;
+        line.push('\n');
+        self.lines.get_mut().write_all(line.as_bytes()).map_err(|error| lost(error.to_string()))?;
+        let mut reply = String::new();
+        let mut bounded = std::io::Read::take(&mut self.lines, LONGEST_REPLY);
+        bounded.read_line(&mut reply).map_err(|error| lost(error.to_string()))?;
+        if reply.is_empty() {
+            return Err(lost("it was closed at the other end".into()));
+        }
+        serde_json::from_str(&reply).map_err(|_| LinkError::Unexpected {
+            address: self.address.clone(),
+            found: reply.trim_end().chars().take(80).collect(),
+            expected: "a reply of host-cal virtual-board's controller",
+        })
+    }
+
+    /// Asks for something that is only done or refused.
+    ///
+    /// # Errors
+    /// As [`SimClient::ask`]; and a refusal, as [`LinkError::Unexpected`].
+    pub fn act(&mut self, request: &SimRequest) -> Result<(), LinkError> {
+        match self.ask(request)? {
+            SimReply::Done => Ok(()),
+            other => {
+                Err(LinkError::Unexpected { address: self.address.clone(), found: format!("{other:?}"), expected: "`done`" })
+            }
+        }
+    }
+}
+
+/// The simulated robot.
+pub struct SimLink {
+    client: SimClient,
+    joints: usize,
+    latest: MoveState,
+    deadline: Instant,
+    patience: Duration,
+}
+
+/// At a free pace the robot's time is shorter than the wall's, and at a real one a move takes some ten seconds.
+const LONGEST_MOVE: Duration = Duration::from_secs(120);
+
+impl SimLink {
+    /// Connects to the controller of a robot of so many joints.
+    ///
+    /// # Errors
+    /// [`LinkError::Unreachable`].
+    pub fn connect(address: &str, joints: usize) -> Result<Self, LinkError> {
+        let client = SimClient::connect(address)?;
+        Ok(Self { client, joints, latest: MoveState::Reached, deadline: Instant::now(), patience: LONGEST_MOVE })
+    }
+
+    fn state(&mut self) -> Result<(bool, JointVector<f64>), LinkError> {
+        match self.client.ask(&SimRequest::State)? {
+            SimReply::State { is_moving, q } if q.len() == self.joints => {
+                let mut vector = JointVector::zero();
+                vector.as_array_mut()[..q.len()].copy_from_slice(&q);
+                Ok((is_moving, vector))
+            }
+            other => Err(LinkError::Unexpected {
+                address: self.client.address.clone(),
+                found: format!("{other:?}"),
+                expected: "the state of a robot with as many joints",
+            }),
+        }
+    }
+}
+
+impl RobotLink for SimLink {
+    fn name(&self) -> String {
+        format!("sim at {}", self.client.address)
+    }
+
+    fn start_move(&mut self, q: &JointVector<f64>, speed: &JointSpeed) -> Result<(), LinkError> {
+        let JointSpeed { revolute_rad_s, prismatic_m_s } = *speed;
+        let request = SimRequest::Move { q: q.as_array()[..self.joints].to_vec(), revolute_rad_s, prismatic_m_s };
+        self.latest = match self.client.ask(&request)? {
+            SimReply::Refused(words) => MoveState::Refused(words),
+            _ => MoveState::Moving,
+        };
+        self.deadline = Instant::now() + self.patience;
+        Ok(())
+    }
+
+    fn poll(&mut self) -> Result<MoveState, LinkError> {
+        if self.latest == MoveState::Moving {
+            if !self.state()?.0 {
+                self.latest = MoveState::Reached;
+            } else if Instant::now() > self.deadline {
+                self.latest = MoveState::TimedOut(self.patience);
+            }
+        }
+        Ok(self.latest.clone())
+    }
+
+    fn joints(&mut self) -> Result<Option<JointVector<f64>>, LinkError> {
+        Ok(Some(self.state()?.1))
+    }
+
+    fn stop(&mut self) -> Result<(), LinkError> {
+        if self.latest == MoveState::Moving {
+            self.latest = MoveState::Fault("stopped on the way".into());
+        }
+        self.client.act(&SimRequest::Halt)
+    }
+
+    fn recover(&mut self) -> Result<(), LinkError> {
+        Ok(())
+    }
+}
