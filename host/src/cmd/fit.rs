@@ -6,6 +6,7 @@ use ballbar::Damping;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::hold_out::HeldOutRows;
 use super::inputs::{Measured, MeasuredArgs, OutputArgs};
 use super::lines::{NotIdentified, PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
@@ -72,6 +73,9 @@ pub(super) struct FitReport {
     rms_mm: f64,
     rms_history_mm: Vec<f64>,
     held_out: Option<HeldOut>,
+    /// Poses of --hold-out, which the fit has not seen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_out_rows: Option<HeldOutRows>,
     /// Of the free columns, scaled; null when they are dependent.
     condition: f64,
     /// Estimated standard deviation of one length.
@@ -159,7 +163,8 @@ impl FitArgs {
 
 impl FitReport {
     pub(super) fn new(measured: &Measured, fit: &Fit) -> Self {
-        let Measured { robot, rig, dataset, warnings } = measured;
+        let Measured { robot, rig, dataset, held_out, warnings } = measured;
+        let held_out_rows = held_out.as_ref().map(|(rule, rows)| HeldOutRows::new(rule, rows, robot, &fit.solution.chain));
         let test = match fit.solution.status {
             Status::Converged(ConvergenceTest::Gradient) => Some("gradient"),
             Status::Converged(ConvergenceTest::Cost) => Some("cost"),
@@ -200,7 +205,11 @@ impl FitReport {
                 .collect(),
             warnings: warnings.clone(),
             out: None,
-            objection: fit.objection().map(|objection| objection.to_string()),
+            objection: fit
+                .objection()
+                .map(|objection| objection.to_string())
+                .or_else(|| held_out_rows.as_ref().and_then(HeldOutRows::objection)),
+            held_out_rows,
             asked_out: None,
         }
     }
@@ -353,7 +362,8 @@ impl FitReport {
         if let Some(held_out) = &self.held_out {
             text += &format!("; {:.4} mm on poses left out ({} folds)", held_out.rms_mm, held_out.folds);
         }
-        text + "\n"
+        text += "\n";
+        text + &self.held_out_rows.as_ref().map_or(String::new(), HeldOutRows::text)
     }
 
     fn pairings_text(&self) -> String {

@@ -1,14 +1,16 @@
 //! Arguments that several commands share, and reading what they name.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
 
+use super::hold_out::HoldOut;
 use super::outcome::CommandError;
 use super::report::warn;
-use crate::files::{Dataset, PairingId, Rig, Robot, RowWarning};
+use crate::files::{Dataset, PairingId, Rig, Robot, RowWarning, Source};
+use crate::session::{POSES_NAME, RIG_NAME, ROBOT_NAME};
 
 /// `--json`.
 #[derive(Args)]
@@ -21,14 +23,18 @@ pub(super) struct OutputArgs {
 /// A robot, a rig and files of poses.
 #[derive(Args)]
 pub(super) struct MeasuredArgs {
-    /// robot.toml, or a built-in: puma560, puma560-optimised, irb120, ur5e, stanford, scara
+    /// robot.toml, or a built-in: puma560, puma560-optimised, irb120, ur5e, stanford, scara; a session's when not given
     #[arg(long)]
-    robot: String,
-    /// rig.toml, or the built-in: triangles
+    robot: Option<String>,
+    /// rig.toml, or the built-in: triangles; a session's when not given
     #[arg(long)]
-    rig: String,
-    /// Files of measured poses (poses.csv)
-    #[arg(required = true)]
+    rig: Option<String>,
+    /// Keep poses apart: bar=610, pairing=A:1 or set=NAME, several separated by commas. `fit` and `rank` take the others, `validate`
+    /// takes these
+    #[arg(long, value_name = "KEY=VALUE,…")]
+    hold_out: Option<HoldOut>,
+    /// Files of measured poses (poses.csv), or sessions
+    #[arg(required = true, value_name = "SESSION|POSES")]
     poses: Vec<PathBuf>,
 }
 
@@ -37,6 +43,8 @@ pub(super) struct Measured {
     pub(super) robot: Robot,
     pub(super) rig: Rig,
     pub(super) dataset: Dataset,
+    /// Poses that `--hold-out` keeps apart.
+    pub(super) held_out: Option<(HoldOut, Dataset)>,
     /// Rows that may be mistakes, in words.
     pub(super) warnings: Vec<String>,
 }
@@ -44,15 +52,48 @@ pub(super) struct Measured {
 impl MeasuredArgs {
     /// Reads the files and says on stderr what may be wrong with them.
     pub(super) fn read(&self) -> Result<Measured, CommandError> {
-        let robot = Robot::open(&self.robot)?;
-        let rig = Rig::open(&self.rig)?;
-        let dataset = Dataset::read(self.poses.iter().map(PathBuf::as_path), &robot, &rig)?;
+        let robot = Robot::open(&self.of_session(self.robot.as_ref(), "--robot", ROBOT_NAME)?)?;
+        let rig = Rig::open(&self.of_session(self.rig.as_ref(), "--rig", RIG_NAME)?)?;
+        let files: Vec<PathBuf> = self.poses.iter().map(|path| poses_of(path)).collect::<Result<_, _>>()?;
+        let dataset = Dataset::read(files.iter().map(PathBuf::as_path), &robot, &rig)?;
         let warnings = summarise(&dataset, &dataset.warnings(&robot, &rig));
         for warning in &warnings {
             warn(warning);
         }
-        Ok(Measured { robot, rig, dataset, warnings })
+        let (held_out, dataset) = match &self.hold_out {
+            None => (None, dataset),
+            Some(rule) => {
+                let (held_out, others) = rule.split(dataset, &rig)?;
+                (Some((rule.clone(), held_out)), others)
+            }
+        };
+        Ok(Measured { robot, rig, dataset, held_out, warnings })
     }
+
+    /// What was given, or else the file of that name in the sessions; they have to agree.
+    fn of_session(&self, given: Option<&String>, flag: &'static str, name: &'static str) -> Result<String, CommandError> {
+        if let Some(given) = given {
+            return Ok(given.clone());
+        }
+        let files: Vec<PathBuf> = self.poses.iter().map(|path| path.join(name)).filter(|file| file.is_file()).collect();
+        let texts: Vec<Source> = files.iter().map(|file| Source::read(file)).collect::<Result<_, _>>()?;
+        match files.split_first() {
+            None => Err(ListError::Missing { flag, name }.into()),
+            Some(_) if texts.windows(2).any(|pair| pair[0].text() != pair[1].text()) => {
+                Err(ListError::SessionsDiffer { flag, name }.into())
+            }
+            Some((first, _)) => Ok(first.display().to_string()),
+        }
+    }
+}
+
+/// The file itself, or a session's.
+fn poses_of(path: &Path) -> Result<PathBuf, ListError> {
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let poses = path.join(POSES_NAME);
+    if poses.is_file() { Ok(poses) } else { Err(ListError::NoPosesYet(path.to_owned())) }
 }
 
 /// One sentence for each kind of warning, with the first rows that it concerns.
@@ -88,6 +129,28 @@ pub(super) enum ListError {
     #[error("no pose has one of the pairings {0}")]
     #[diagnostic(help("The poses have {1}."))]
     NoPoseLeft(String, String),
+    /// Neither given nor in a session.
+    #[error("{flag} is missing, and no session among the poses holds a {name}")]
+    #[diagnostic(help("Give it: {flag} FILE. Sessions that `host-cal collect` recorded hold theirs."))]
+    Missing {
+        /// The flag.
+        flag: &'static str,
+        /// The session's file.
+        name: &'static str,
+    },
+    /// Sessions of different robots or rigs.
+    #[error("the sessions hold different files {name}")]
+    #[diagnostic(help("Say which one to use: {flag} FILE"))]
+    SessionsDiffer {
+        /// The flag.
+        flag: &'static str,
+        /// The session's file.
+        name: &'static str,
+    },
+    /// A directory without poses.
+    #[error("{}: holds no poses.csv", .0.display())]
+    #[diagnostic(help("Give a file of poses, or a session into which poses were recorded."))]
+    NoPosesYet(PathBuf),
     /// No bar length to simulate.
     #[error("the rig names no bar length")]
     #[diagnostic(help("Give one, in millimetres: --bar 460"))]

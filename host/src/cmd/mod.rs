@@ -8,6 +8,7 @@ mod apply;
 mod demo;
 mod fit;
 mod fk;
+mod hold_out;
 mod home;
 mod inputs;
 mod lines;

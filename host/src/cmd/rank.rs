@@ -63,7 +63,7 @@ impl RankArgs {
 }
 
 fn report(measured: Measured) -> RankReport {
-    let Measured { robot, rig, dataset, warnings } = measured;
+    let Measured { robot, rig, dataset, warnings, .. } = measured;
     let found = Identifiability::new(&robot.chain, &dataset.measurements(), &robot.limits, &[]);
     RankReport {
         poses: dataset.rows.len(),

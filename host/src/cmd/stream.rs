@@ -216,8 +216,8 @@ impl StreamArgs {
             ..Run::beginning(link.port_name(), link.hello(), self.rate)
         };
         let kinds = robot.map_or(&[][..], |(robot, _)| robot.kinds());
-        let connection = connection.map(|connection| (connection, kinds));
-        let mut recorder = Recorder::begin(session, run, connection).map_err(record_error)?;
+        let mut recorder = Recorder::begin(session, run, connection.is_some().then_some(kinds)).map_err(record_error)?;
+        recorder.connect(connection);
         recorder.frame(link.hello_frame()).map_err(record_error)?;
         if let Some((_, frame)) = robot {
             recorder.frame(frame).map_err(record_error)?;

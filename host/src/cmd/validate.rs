@@ -30,6 +30,9 @@ pub(super) struct ValidateArgs {
 struct ValidateReport {
     robot: String,
     calibrated: bool,
+    /// The rule of --hold-out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_out: Option<String>,
     poses: usize,
     rms_mm: f64,
     max_abs_mm: f64,
@@ -54,13 +57,15 @@ impl ValidateArgs {
     }
 
     fn report(&self, measured: Measured) -> ValidateReport {
-        let Measured { robot, rig, dataset, warnings } = measured;
+        let Measured { robot, rig, dataset, held_out, warnings } = measured;
+        let (rule, dataset) = held_out.map_or((None, dataset), |(rule, rows)| (Some(rule.to_string()), rows));
         let residuals = residuals(&robot.chain, &dataset);
         let summary = ResidualSummary::new(&residuals);
         let rms_mm = mm_from_m(summary.rms_m);
         ValidateReport {
             calibrated: robot.calibration.is_some(),
             robot: robot.name,
+            held_out: rule,
             poses: summary.count,
             rms_mm,
             max_abs_mm: mm_from_m(summary.max_abs_m),
@@ -76,7 +81,8 @@ impl ValidateArgs {
 impl Report for ValidateReport {
     fn text(&self) -> String {
         let calibrated = if self.calibrated { "calibrated" } else { "not calibrated" };
-        let mut text = format!("{} ({calibrated}), {} poses\n\n", self.robot, self.poses);
+        let rule = self.held_out.as_ref().map_or(String::new(), |rule| format!(" held out ({rule})"));
+        let mut text = format!("{} ({calibrated}), {} poses{rule}\n\n", self.robot, self.poses);
         text += &format!("RMS {:.4} mm, mean {:.4} mm, largest {:.4} mm\n\n", self.rms_mm, self.mean_mm, self.max_abs_mm);
         let mut table = Columns::new(&["<pairing", "poses", "RMS mm", "mean mm", "largest mm"]);
         for line in &self.by_pairing {

@@ -22,6 +22,8 @@ pub struct PoseRow {
     pub set: Option<String>,
     /// Time of the measurement, seconds, where the file gives it.
     pub t_s: Option<f64>,
+    /// Length of the bar at mid travel, metres, where the file gives it.
+    pub bar_m: Option<f64>,
     /// Index into [`Dataset::files`].
     pub file: usize,
     /// Line in that file, from 1.

@@ -43,6 +43,18 @@ impl Dataset {
         Ok(())
     }
 
+    /// The rows for which `is_apart` holds, and the others; each weighed by itself.
+    #[must_use]
+    pub fn split(self, is_apart: impl Fn(&PoseRow) -> bool) -> (Self, Self) {
+        let (apart, others) = self.rows.into_iter().partition(is_apart);
+        let part = |rows| {
+            let mut part = Self { rows, files: self.files.clone() };
+            part.set_weights();
+            part
+        };
+        (part(apart), part(others))
+    }
+
     /// Weights `1/σ²`, scaled to mean 1 so that weighted residuals stay lengths.
     fn set_weights(&mut self) {
         let inverse_variance = |row: &PoseRow| row.sigma_m.map_or(1.0, |sigma| 1.0 / (sigma * sigma));
@@ -62,13 +74,14 @@ struct Columns {
     sigma: Option<usize>,
     set: Option<usize>,
     t: Option<usize>,
+    bar: Option<usize>,
 }
 
 /// All rows of one file, weighted alike.
 fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<Vec<PoseRow>, InputError> {
-    const COLUMNS: [&str; 6] = ["chuck", "sphere", "length_mm", "sigma_mm", "set", "t_s"];
-    const HEADER: &str =
-        "chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); optional: sigma_mm, set, t_s";
+    const COLUMNS: [&str; 8] = ["chuck", "sphere", "length_mm", "sigma_mm", "set", "t_s", "bar_mm", "plan_row"];
+    const HEADER: &str = "chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); \
+                          optional: sigma_mm, set, t_s, bar_mm, plan_row";
     let rows = CsvRows::split(source, robot, rig, &COLUMNS, HEADER)?;
     let columns = Columns {
         chuck: rows.required("chuck")?,
@@ -78,6 +91,7 @@ fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<V
         sigma: rows.optional("sigma_mm"),
         set: rows.optional("set"),
         t: rows.optional("t_s"),
+        bar: rows.optional("bar_mm"),
     };
     rows.records().iter().map(|record| read_row(&rows, &columns, record, file)).collect()
 }
@@ -88,12 +102,14 @@ fn read_row(rows: &CsvRows<'_>, columns: &Columns, record: &StringRecord, file: 
     let length_m = m_from_mm(rows.number(record, columns.length, Of::Positive)?);
     let sigma = columns.sigma.map(|column| rows.number(record, column, Of::Deviation));
     let t_s = columns.t.map(|column| rows.number(record, column, Of::Finite));
+    let bar = columns.bar.map(|column| rows.number(record, column, Of::Positive));
     Ok(PoseRow {
         pairing,
         measurement: Measurement { pairing: rows.rig.pairing(pairing), q, length_m, weight: 1.0 },
         sigma_m: sigma.transpose()?.map(m_from_mm),
         set: columns.set.map(|column| record[column].to_owned()),
         t_s: t_s.transpose()?,
+        bar_m: bar.transpose()?.map(m_from_mm),
         file,
         line: rows.line(record),
     })

@@ -34,8 +34,10 @@ pub struct Run {
     pub rig: Option<String>,
     /// `chuck:sphere` that the bar joined.
     pub pairing: Option<String>,
-    /// The bar's length at mid travel, millimetres.
+    /// The bar's length at mid travel, millimetres; poses.csv has it where it changed.
     pub bar_mm: Option<f64>,
+    /// Kind and address of the robot's controller, where a plan was walked.
+    pub robot_link: Option<String>,
     /// Temperature, where somebody gave it, degrees Celsius.
     pub temperature_c: Option<f64>,
     /// Sampling rate, Hz.

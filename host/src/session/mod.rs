@@ -5,6 +5,7 @@
 //! | `session.toml` | robot, rig, bar, board, versions and times of every run; written by rename |
 //! | `stream.bbl` | the frames exactly as they came and were found whole; append-only |
 //! | `poses.csv` | the settled poses as [`crate::files`] reads them; written by rename |
+//! | `plan.csv`, `robot.toml`, `rig.toml` | what a plan was walked with, copied |
 
 mod description;
 mod export;
@@ -24,3 +25,9 @@ pub const LOG_NAME: &str = "stream.bbl";
 pub const DESCRIPTION_NAME: &str = "session.toml";
 /// Name of the poses in a session.
 pub const POSES_NAME: &str = "poses.csv";
+/// Name of the plan in a session.
+pub const PLAN_NAME: &str = "plan.csv";
+/// Name of the robot that a plan was made for, in a session.
+pub const ROBOT_NAME: &str = "robot.toml";
+/// Name of the rig in a session.
+pub const RIG_NAME: &str = "rig.toml";

@@ -53,7 +53,8 @@ pub struct Connection {
 pub struct Recorder {
     session: PathBuf,
     log: LogWriter,
-    poses: Option<(PoseFile, Connection)>,
+    poses: Option<PoseFile>,
+    connection: Option<Connection>,
     description: Description,
     synced: Instant,
 }
@@ -62,22 +63,24 @@ pub struct Recorder {
 const SYNC_EVERY: Duration = Duration::from_secs(1);
 
 impl Recorder {
-    /// Begins a run in a session's directory, which is made when it is not there. With a connection and the kinds of the joints,
-    /// settled poses go to poses.csv.
+    /// Begins a run in a session's directory, which is made when it is not there. With the kinds of the robot's joints, poses can
+    /// go to poses.csv.
     ///
     /// # Errors
     /// [`RecordError`]; nothing that was in the directory is changed then.
-    pub fn begin(session: &Path, run: Run, connection: Option<(Connection, &[JointKind])>) -> Result<Self, RecordError> {
+    pub fn begin(session: &Path, run: Run, kinds: Option<&[JointKind]>) -> Result<Self, RecordError> {
         std::fs::create_dir_all(session).map_err(|error| RecordError::Directory { path: session.to_owned(), error })?;
         let mut description = Description::read(session)?;
-        let poses = match connection {
-            Some((connection, kinds)) => Some((PoseFile::open(&session.join(POSES_NAME), kinds)?, connection)),
-            None => None,
-        };
+        let poses = kinds.map(|kinds| PoseFile::open(&session.join(POSES_NAME), kinds)).transpose()?;
         let log = LogWriter::open(&session.join(LOG_NAME))?;
         description.runs.push(run);
         description.write(session)?;
-        Ok(Self { session: session.to_owned(), log, poses, description, synced: Instant::now() })
+        Ok(Self { session: session.to_owned(), log, poses, connection: None, description, synced: Instant::now() })
+    }
+
+    /// From here on poses are those of this connection.
+    pub fn connect(&mut self, connection: Option<Connection>) {
+        self.connection = connection;
     }
 
     /// Keeps a frame.
@@ -95,18 +98,38 @@ impl Recorder {
 
     /// Whether settled poses go to poses.csv.
     pub fn writes_poses(&self) -> bool {
-        self.poses.is_some()
+        self.poses.is_some() && self.connection.is_some()
     }
 
-    /// Keeps a settled pose; does nothing when no connection was named.
+    /// Keeps a settled pose, and the line of plan.csv that it was measured for; does nothing without a connection.
     ///
     /// # Errors
     /// [`RecordError::Poses`].
-    pub fn pose(&mut self, q: JointVector<f64>, displacement_m: f64, t_s: f64) -> Result<(), RecordError> {
-        if let Some((file, Connection { chuck, sphere, bar_m })) = &mut self.poses {
-            file.add(&SettledRow { chuck, sphere, q, length_m: *bar_m + displacement_m, t_s })?;
+    pub fn pose(
+        &mut self,
+        q: JointVector<f64>,
+        displacement_m: f64,
+        t_s: f64,
+        plan_row: Option<usize>,
+    ) -> Result<(), RecordError> {
+        if let (Some(file), Some(Connection { chuck, sphere, bar_m })) = (&mut self.poses, &self.connection) {
+            let bar_m = *bar_m;
+            file.add(&SettledRow { chuck, sphere, q, length_m: bar_m + displacement_m, t_s, bar_m, plan_row })?;
         }
         Ok(())
+    }
+
+    /// Takes the latest pose out again; gives its line of plan.csv.
+    ///
+    /// # Errors
+    /// [`RecordError::Poses`].
+    pub fn erase_last(&mut self) -> Result<Option<usize>, RecordError> {
+        Ok(self.poses.as_mut().map_or(Ok(None), PoseFile::erase_last)?)
+    }
+
+    /// What was recorded, for facts that a run learns on its way; written when the run ends.
+    pub fn run_mut(&mut self) -> Option<&mut Run> {
+        self.description.runs.last_mut()
     }
 
     /// Notes that the port was lost.
@@ -131,7 +154,7 @@ impl Recorder {
     /// [`RecordError`].
     pub fn end(mut self) -> Result<(), RecordError> {
         self.log.sync()?;
-        let added = self.poses.as_ref().map_or(0, |(file, _)| file.added());
+        let added = self.poses.as_ref().map_or(0, PoseFile::added);
         if let Some(run) = self.description.runs.last_mut() {
             run.ended = Some(now());
             run.poses = added;
@@ -151,6 +174,7 @@ impl Run {
             rig: None,
             pairing: None,
             bar_mm: None,
+            robot_link: None,
             temperature_c: None,
             rate_hz,
             poses: 0,

@@ -141,6 +141,7 @@ impl Shells<'_> {
                 sigma_m: None,
                 set: Some(tidy(mm_from_m(self.bar_m)).to_string()),
                 t_s: None,
+                bar_m: Some(self.bar_m),
                 file: 0,
                 line: 0,
             },

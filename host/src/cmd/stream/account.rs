@@ -159,7 +159,7 @@ impl Account {
             return Ok("; still where the last pose was written: not written again");
         }
         let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
-        recorder.pose(q, displacement_m, t_s).map_err(record_error)?;
+        recorder.pose(q, displacement_m, t_s, None).map_err(record_error)?;
         self.written += 1;
         self.last_written = Some(pose.clone());
         Ok("")
