@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`board`] | the host's end of the wire: port, requests, losses |
 //! | [`robot_link`] | robot controllers: how a robot is moved, whoever made it |
+//! | [`collect`] | walks a plan: moves the robot, waits, measures, keeps |
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
@@ -19,6 +20,7 @@
 
 pub mod board;
 pub mod cmd;
+pub mod collect;
 pub mod files;
 pub mod identify;
 pub mod kinematics;

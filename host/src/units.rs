@@ -76,3 +76,22 @@ impl From<JointKind> for ScreenUnit {
         }
     }
 }
+
+/// A number with so many decimals; what rounds to zero has no sign.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
+        _ => text,
+    }
+}
+
+/// Joint values for people: `10.000 -40.000 … deg`, or with `mm` behind the values that are lengths.
+pub fn joints_text(kinds: &[JointKind], q: &[f64]) -> String {
+    let value = |(&kind, &q): (&JointKind, &f64)| {
+        let unit = ScreenUnit::from(kind);
+        let number = fixed(unit.from_si(q), 3);
+        if kind == JointKind::Prismatic { format!("{number} mm") } else { format!("{number}°") }
+    };
+    kinds.iter().zip(q).map(value).collect::<Vec<_>>().join(" ")
+}

@@ -8,10 +8,10 @@ use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
-use super::port::{PortArgs, joints_text};
+use super::port::PortArgs;
 use super::report::{Report, print};
 use crate::board::RobotOnBoard;
-use crate::units::ScreenUnit;
+use crate::units::{ScreenUnit, joints_text};
 use ballbar::JointKind;
 
 /// Tell the board where the joints stand (its encoders count from there)

@@ -4,6 +4,7 @@
 //! `--json`. Progress and warnings go to stderr.
 
 mod apply;
+mod collect;
 #[cfg(unix)]
 mod demo;
 mod fit;
@@ -12,6 +13,7 @@ mod hold_out;
 mod home;
 mod inputs;
 mod lines;
+mod live_line;
 mod log;
 mod lvdt;
 mod outcome;
@@ -56,6 +58,7 @@ enum Command {
     Rank(rank::RankArgs),
     Fk(fk::FkArgs),
     Plan(plan::PlanArgs),
+    Collect(collect::CollectArgs),
     Simulate(simulate::SimulateArgs),
     Paper(paper::PaperArgs),
     Ports(ports::PortsArgs),
@@ -84,6 +87,7 @@ impl Cli {
             Command::Rank(args) => args.run(),
             Command::Fk(args) => args.run(),
             Command::Plan(args) => args.run(),
+            Command::Collect(args) => args.run(),
             Command::Simulate(args) => args.run(),
             Command::Paper(args) => args.run(),
             Command::Ports(args) => args.run(),

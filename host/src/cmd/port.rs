@@ -3,13 +3,11 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use ballbar::JointKind;
+use ballbar::StillnessCriteria;
 use clap::Args;
 
 use super::outcome::CommandError;
-use super::table::fixed;
 use crate::board::{BAUD, BoardLink};
-use crate::units::ScreenUnit;
 
 /// Which board.
 #[derive(Args)]
@@ -25,6 +23,27 @@ impl PortArgs {
     /// Opens the port and greets the board.
     pub(super) fn connect(&self) -> Result<BoardLink, CommandError> {
         Ok(BoardLink::connect(&self.port, self.baud)?)
+    }
+}
+
+/// When the arm stands still.
+#[derive(Args)]
+pub(super) struct StillnessArgs {
+    /// How long the arm must stand still, 10 to 60000 milliseconds
+    #[arg(long, default_value_t = 500, value_name = "MS", value_parser = clap::value_parser!(u32).range(10..=60_000))]
+    hold_ms: u32,
+    /// Band of the encoders within which the arm stands still, counts
+    #[arg(long, default_value_t = StillnessCriteria::default().band_counts, value_name = "N")]
+    band_counts: u16,
+    /// Band of the LVDT within which the arm stands still, codes of 65,536
+    #[arg(long, default_value_t = StillnessCriteria::default().band_codes, value_name = "N")]
+    band_codes: u16,
+}
+
+impl StillnessArgs {
+    pub(super) fn criteria(&self) -> StillnessCriteria {
+        let hold_us = self.hold_ms.saturating_mul(1_000);
+        StillnessCriteria { hold_us, band_counts: self.band_counts, band_codes: self.band_codes }
     }
 }
 
@@ -45,14 +64,4 @@ impl EndRequest {
     pub(super) fn is_made(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
-}
-
-/// Joint values for people: `10.000 -40.000 … deg`, or with `mm` behind the values that are lengths.
-pub(super) fn joints_text(kinds: &[JointKind], q: &[f64]) -> String {
-    let value = |(&kind, &q): (&JointKind, &f64)| {
-        let unit = ScreenUnit::from(kind);
-        let number = fixed(unit.from_si(q), 3);
-        if kind == JointKind::Prismatic { format!("{number} mm") } else { format!("{number}°") }
-    };
-    kinds.iter().zip(q).map(value).collect::<Vec<_>>().join(" ")
 }

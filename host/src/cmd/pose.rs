@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
-use super::port::{PortArgs, joints_text};
+use super::port::PortArgs;
 use super::report::{Report, print, warn};
 use crate::board::{BoardError, RobotOnBoard};
-use crate::units::{ScreenUnit, mm_from_m};
+use crate::units::{ScreenUnit, joints_text, mm_from_m};
 use ballbar::JointKind;
 
 /// The tool's true pose now, as the board computes it

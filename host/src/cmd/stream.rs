@@ -7,7 +7,6 @@ mod watch;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use ballbar::StillnessCriteria;
 use ballbar::wire::{Command, FrameCounts, StreamSelection};
 use clap::Args;
 use miette::Diagnostic;
@@ -16,7 +15,7 @@ use thiserror::Error;
 
 use super::inputs::{OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
-use super::port::PortArgs;
+use super::port::{PortArgs, StillnessArgs};
 use super::report::{Report, print, warn};
 use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
 use crate::files::Rig;
@@ -55,15 +54,8 @@ pub(super) struct StreamArgs {
     /// Samples a second, 100 to 5000
     #[arg(long, default_value_t = 1000, value_name = "HZ", value_parser = clap::value_parser!(u16).range(100..=5_000))]
     rate: u16,
-    /// How long the arm must stand still, 10 to 60000 milliseconds
-    #[arg(long, default_value_t = 500, value_name = "MS", value_parser = clap::value_parser!(u32).range(10..=60_000))]
-    hold_ms: u32,
-    /// Band of the encoders within which the arm stands still, counts
-    #[arg(long, default_value_t = StillnessCriteria::default().band_counts, value_name = "N")]
-    band_counts: u16,
-    /// Band of the LVDT within which the arm stands still, codes of 65,536
-    #[arg(long, default_value_t = StillnessCriteria::default().band_codes, value_name = "N")]
-    band_codes: u16,
+    #[command(flatten)]
+    stillness: StillnessArgs,
     /// What the bar joins, chuck:sphere
     #[arg(long, value_name = "A:1")]
     pairing: Option<String>,
@@ -144,7 +136,7 @@ impl StreamArgs {
             return Err(StreamError::NoParameters.into());
         }
         let recorder = self.recorder(&link, robot.as_ref(), connection)?;
-        let account = Account::new(robot.map(|(robot, _)| robot), recorder, self.bar, self.criteria());
+        let account = Account::new(robot.map(|(robot, _)| robot), recorder, self.bar, self.stillness.criteria());
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
         let report = watch.finish()?;
@@ -163,14 +155,8 @@ impl StreamArgs {
     /// Tells the board what to do; again after it was away.
     fn start(&self, link: &mut BoardLink) -> Result<(), crate::board::BoardError> {
         link.act(Command::SetRate { rate_hz: self.rate })?;
-        link.act(Command::SetStillness(self.criteria()))?;
+        link.act(Command::SetStillness(self.stillness.criteria()))?;
         link.start_stream(self.selection())
-    }
-
-    /// What counts as standing still.
-    fn criteria(&self) -> StillnessCriteria {
-        let hold_us = self.hold_ms.saturating_mul(1_000);
-        StillnessCriteria { hold_us, band_counts: self.band_counts, band_codes: self.band_codes }
     }
 
     fn connection(&self) -> Result<Option<Connection>, CommandError> {
@@ -230,7 +216,7 @@ impl StreamArgs {
 }
 
 /// What is there and cannot be read is bad input; what cannot be written is not.
-fn record_error(error: crate::session::RecordError) -> CommandError {
+pub(super) fn record_error(error: crate::session::RecordError) -> CommandError {
     use crate::session::{DescriptionError, LogError, PoseFileError, RecordError};
     match error {
         RecordError::Log(LogError::NotALog { .. } | LogError::OtherVersion { .. })

@@ -2,6 +2,8 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 
+pub(super) use crate::units::fixed;
+
 /// A table under construction.
 pub(super) struct Columns(Table);
 
@@ -27,14 +29,5 @@ impl Columns {
     /// The text, a newline behind each line and no white space before one.
     pub(super) fn text(&self) -> String {
         self.0.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
-    }
-}
-
-/// A number with so many decimals; what rounds to zero has no sign.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
-        _ => text,
     }
 }

@@ -18,7 +18,7 @@ mod write;
 
 pub use builtin::{RIGS, ROBOTS};
 pub use plan_rows::{BarAt, PlanRow, RowKind, RowMargins, read_plan, write_plan};
-pub use poses::{Dataset, PoseRow, RowWarning, pose_header, pose_record, write_poses};
+pub use poses::{Dataset, Motion, PoseRow, RowWarning, pose_header, pose_record, write_poses};
 pub use problem::Problem;
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{Calibration, EncoderFacts, JointLimits, NoEncoders, Robot};

@@ -24,10 +24,21 @@ pub struct PoseRow {
     pub t_s: Option<f64>,
     /// Length of the bar at mid travel, metres, where the file gives it.
     pub bar_m: Option<f64>,
+    /// Of an arm that moved, where the file gives it.
+    pub motion: Option<Motion>,
     /// Index into [`Dataset::files`].
     pub file: usize,
     /// Line in that file, from 1.
     pub line: usize,
+}
+
+/// How the length changed while it was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// How fast it grew, metres per second.
+    pub rate_m_s: f64,
+    /// By how much the LVDT's signal was late, as far as it was removed from the length already, seconds.
+    pub removed_lag_s: f64,
 }
 
 /// Measured poses of one robot with one rig, in the order of their files. Rows are numbered from 1.
@@ -68,6 +79,19 @@ impl Dataset {
     /// The measurements alone.
     pub fn measurements(&self) -> Vec<Measurement<f64>> {
         self.rows.iter().map(|row| row.measurement).collect()
+    }
+
+    /// The same poses with lengths from which a lag of the LVDT was removed, instead of what was removed before.
+    #[must_use]
+    pub fn with_lag_removed(&self, lag_s: f64) -> Self {
+        let mut corrected = self.clone();
+        for row in &mut corrected.rows {
+            if let Some(motion) = &mut row.motion {
+                row.measurement.length_m += (lag_s - motion.removed_lag_s) * motion.rate_m_s;
+                motion.removed_lag_s = lag_s;
+            }
+        }
+        corrected
     }
 
     /// The pairings that occur, in the rig's order.

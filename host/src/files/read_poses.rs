@@ -7,7 +7,7 @@ use csv::StringRecord;
 
 use super::csv_rows::CsvRows;
 use super::numbers::Range as Of;
-use super::poses::{Dataset, PoseRow};
+use super::poses::{Dataset, Motion, PoseRow};
 use super::problem::Problem;
 use super::rig::Rig;
 use super::robot::Robot;
@@ -75,13 +75,16 @@ struct Columns {
     set: Option<usize>,
     t: Option<usize>,
     bar: Option<usize>,
+    /// Of the rate and of the lag.
+    motion: Option<(usize, usize)>,
 }
 
 /// All rows of one file, weighted alike.
 fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<Vec<PoseRow>, InputError> {
-    const COLUMNS: [&str; 8] = ["chuck", "sphere", "length_mm", "sigma_mm", "set", "t_s", "bar_mm", "plan_row"];
+    const COLUMNS: [&str; 10] =
+        ["chuck", "sphere", "length_mm", "sigma_mm", "set", "t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
     const HEADER: &str = "chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); \
-                          optional: sigma_mm, set, t_s, bar_mm, plan_row";
+                          optional: sigma_mm, set, t_s, bar_mm, plan_row, rate_mm_s, lag_ms";
     let rows = CsvRows::split(source, robot, rig, &COLUMNS, HEADER)?;
     let columns = Columns {
         chuck: rows.required("chuck")?,
@@ -92,6 +95,7 @@ fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<V
         set: rows.optional("set"),
         t: rows.optional("t_s"),
         bar: rows.optional("bar_mm"),
+        motion: rows.optional("rate_mm_s").zip(rows.optional("lag_ms")),
     };
     rows.records().iter().map(|record| read_row(&rows, &columns, record, file)).collect()
 }
@@ -110,7 +114,18 @@ fn read_row(rows: &CsvRows<'_>, columns: &Columns, record: &StringRecord, file: 
         set: columns.set.map(|column| record[column].to_owned()),
         t_s: t_s.transpose()?,
         bar_m: bar.transpose()?.map(m_from_mm),
+        motion: columns.motion.map_or(Ok(None), |(rate, lag)| read_motion(rows, record, rate, lag))?,
         file,
         line: rows.line(record),
     })
+}
+
+/// Of an arm that moved; both fields are empty for one that stood.
+fn read_motion(rows: &CsvRows<'_>, record: &StringRecord, rate: usize, lag: usize) -> Result<Option<Motion>, InputError> {
+    if record[rate].is_empty() && record[lag].is_empty() {
+        return Ok(None);
+    }
+    let rate_m_s = m_from_mm(rows.number(record, rate, Of::Plausible)?);
+    let removed_lag_s = rows.number(record, lag, Of::Plausible)? * 1e-3;
+    Ok(Some(Motion { rate_m_s, removed_lag_s }))
 }

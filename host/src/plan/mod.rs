@@ -33,3 +33,4 @@ pub use planner::{Comparison, Plan, PlanError, PlanOptions, ShellSummary, plan};
 pub use posture::Hindrance;
 pub use quality::{Expectation, Quality};
 pub use scene::{Contact, FixturesOverlap, Nearest, Scene};
+pub use way::way_between;

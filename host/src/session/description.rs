@@ -38,6 +38,9 @@ pub struct Run {
     pub bar_mm: Option<f64>,
     /// Kind and address of the robot's controller, where a plan was walked.
     pub robot_link: Option<String>,
+    /// Lines of plan.csv that the operator skipped.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skipped: Vec<usize>,
     /// Temperature, where somebody gave it, degrees Celsius.
     pub temperature_c: Option<f64>,
     /// Sampling rate, Hz.

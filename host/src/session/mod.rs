@@ -17,7 +17,7 @@ pub use description::{BoardDescription, Description, DescriptionError, RobotDesc
 pub use export::{ExportError, export_csv};
 pub use log::{LogError, LogReader, LogSummary, LogWriter, Record};
 pub use pose_file::{PoseFile, PoseFileError, SettledRow};
-pub use recorder::{Connection, RecordError, Recorder};
+pub use recorder::{Connection, MeasuredPose, RecordError, Recorder};
 
 /// Name of the log in a session.
 pub const LOG_NAME: &str = "stream.bbl";

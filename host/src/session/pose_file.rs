@@ -7,7 +7,7 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use crate::files::{WriteError, pose_header, pose_record, write_atomically};
-use crate::units::mm_from_m;
+use crate::units::{mm_from_m, tidy};
 
 /// A settled pose as it goes into the file.
 #[derive(Clone, Debug)]
@@ -18,12 +18,14 @@ pub struct SettledRow<'a> {
     pub sphere: &'a str,
     /// Joint values, radians or metres.
     pub q: JointVector<f64>,
-    /// Length of the bar, metres.
+    /// Length of the bar as measured, metres.
     pub length_m: f64,
     /// Time of the middle of the pose by the board's clock, seconds.
     pub t_s: f64,
     /// Length of the bar at mid travel, metres.
     pub bar_m: f64,
+    /// How fast the length grew, metres per second, where the arm moved.
+    pub rate_m_s: Option<f64>,
     /// Line of plan.csv that it was measured for.
     pub plan_row: Option<usize>,
 }
@@ -39,7 +41,9 @@ pub struct PoseFile {
 }
 
 /// The optional columns that a session's poses have.
-const COLUMNS: [&str; 3] = ["t_s", "bar_mm", "plan_row"];
+const COLUMNS: [&str; 5] = ["t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
+/// Where some of them stand, counted from the end of a line.
+const PLAN_ROW_FROM_END: usize = 2;
 
 /// Why poses cannot be added.
 #[derive(Debug, Error, Diagnostic)]
@@ -91,19 +95,27 @@ impl PoseFile {
 
     /// Lines of plan.csv that poses were measured for, in the order of the file.
     pub fn plan_rows(&self) -> impl Iterator<Item = usize> + '_ {
-        self.lines.iter().filter_map(|line| line.rsplit(',').next()?.trim().parse().ok())
+        self.lines.iter().filter_map(|line| plan_row(line))
     }
 
-    /// Adds a pose and writes the file.
+    /// Adds poses and writes the file.
     ///
     /// # Errors
     /// [`PoseFileError::Write`]; the file is then as it was.
-    pub fn add(&mut self, row: &SettledRow<'_>) -> Result<(), PoseFileError> {
-        let plan_row = row.plan_row.map_or_else(String::new, |row| row.to_string());
-        let optional = [format!("{:.6}", row.t_s), mm_from_m(row.bar_m).to_string(), plan_row];
-        self.lines.push(pose_record(row.chuck, row.sphere, &self.kinds, &row.q, row.length_m, &optional));
-        self.write()?;
-        self.added += 1;
+    pub fn add<'a>(&mut self, rows: impl IntoIterator<Item = SettledRow<'a>>) -> Result<(), PoseFileError> {
+        let before = self.lines.len();
+        for row in rows {
+            let plan_row = row.plan_row.map_or_else(String::new, |row| row.to_string());
+            let rate = row.rate_m_s.map_or_else(String::new, |rate_m_s| format!("{:.6}", mm_from_m(rate_m_s)));
+            let lag = row.rate_m_s.map_or_else(String::new, |_| "0".into());
+            let optional = [format!("{:.6}", row.t_s), tidy(mm_from_m(row.bar_m)).to_string(), plan_row, rate, lag];
+            self.lines.push(pose_record(row.chuck, row.sphere, &self.kinds, &row.q, row.length_m, &optional));
+        }
+        if let Err(error) = self.write() {
+            self.lines.truncate(before);
+            return Err(error.into());
+        }
+        self.added += self.lines.len() - before;
         Ok(())
     }
 
@@ -116,7 +128,32 @@ impl PoseFile {
         let Some(line) = self.lines.pop() else { return Ok(None) };
         self.write()?;
         self.added = self.added.saturating_sub(1);
-        Ok(line.rsplit(',').next().and_then(|field| field.trim().parse().ok()))
+        Ok(plan_row(&line))
+    }
+
+    /// Removes a lag of the LVDT from the lengths of moving arms, instead of what was removed before, and writes the file.
+    ///
+    /// # Errors
+    /// [`PoseFileError::Write`].
+    pub fn remove_lag(&mut self, lag_s: f64) -> Result<(), PoseFileError> {
+        let length_column = 2 + self.kinds.len();
+        for line in &mut self.lines {
+            // No name has a comma or a quote.
+            let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+            let number = |field: &String| field.trim().parse::<f64>().ok();
+            if let [.., rate, removed] = &fields[..]
+                && let (Some(rate_mm_s), Some(removed_ms), Some(length_mm)) =
+                    (number(rate), number(removed), fields.get(length_column).and_then(number))
+            {
+                let lag_ms = (lag_s * 1e9).round() / 1e6;
+                fields[length_column] = format!("{:.6}", length_mm + (lag_ms - removed_ms) * 1e-3 * rate_mm_s);
+                if let Some(removed) = fields.last_mut() {
+                    *removed = lag_ms.to_string();
+                }
+                *line = fields.join(",");
+            }
+        }
+        Ok(self.write()?)
     }
 
     /// Poses added since the file was opened, less those erased.
@@ -128,4 +165,8 @@ impl PoseFile {
         let lines = std::iter::once(&self.header).chain(&self.lines);
         write_atomically(&self.path, &lines.flat_map(|line| [line.as_str(), "\n"]).collect::<String>())
     }
+}
+
+fn plan_row(line: &str) -> Option<usize> {
+    line.rsplit(',').nth(PLAN_ROW_FROM_END)?.trim().parse().ok()
 }

@@ -49,6 +49,21 @@ pub struct Connection {
     pub bar_m: f64,
 }
 
+/// A pose to keep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasuredPose {
+    /// Encoder outputs, radians or metres.
+    pub q: JointVector<f64>,
+    /// Displacement of the bar from mid travel, metres.
+    pub displacement_m: f64,
+    /// Time of its middle by the board's clock, seconds.
+    pub t_s: f64,
+    /// How fast the length grew, metres per second, where the arm moved.
+    pub rate_m_s: Option<f64>,
+    /// Line of plan.csv that it was measured for.
+    pub plan_row: Option<usize>,
+}
+
 /// A session being recorded.
 pub struct Recorder {
     session: PathBuf,
@@ -101,22 +116,45 @@ impl Recorder {
         self.poses.is_some() && self.connection.is_some()
     }
 
-    /// Keeps a settled pose, and the line of plan.csv that it was measured for; does nothing without a connection.
+    /// Keeps poses; does nothing without a connection.
     ///
     /// # Errors
     /// [`RecordError::Poses`].
-    pub fn pose(
-        &mut self,
-        q: JointVector<f64>,
-        displacement_m: f64,
-        t_s: f64,
-        plan_row: Option<usize>,
-    ) -> Result<(), RecordError> {
+    pub fn poses(&mut self, poses: &[MeasuredPose]) -> Result<(), RecordError> {
         if let (Some(file), Some(Connection { chuck, sphere, bar_m })) = (&mut self.poses, &self.connection) {
-            let bar_m = *bar_m;
-            file.add(&SettledRow { chuck, sphere, q, length_m: bar_m + displacement_m, t_s, bar_m, plan_row })?;
+            file.add(poses.iter().map(|pose| SettledRow {
+                chuck,
+                sphere,
+                q: pose.q,
+                length_m: bar_m + pose.displacement_m,
+                t_s: pose.t_s,
+                bar_m: *bar_m,
+                rate_m_s: pose.rate_m_s,
+                plan_row: pose.plan_row,
+            }))?;
         }
         Ok(())
+    }
+
+    /// Lines of plan.csv that poses were kept for, over all runs.
+    pub fn measured_lines(&self) -> Vec<usize> {
+        self.poses.as_ref().map_or_else(Vec::new, |file| file.plan_rows().collect())
+    }
+
+    /// Lines of plan.csv that the operator skipped, over all runs.
+    pub fn skipped_lines(&self) -> Vec<usize> {
+        self.description.runs.iter().flat_map(|run| run.skipped.iter().copied()).collect()
+    }
+
+    /// Notes that the operator skips a line of plan.csv.
+    ///
+    /// # Errors
+    /// [`RecordError::Description`].
+    pub fn skip(&mut self, line: usize) -> Result<(), RecordError> {
+        if let Some(run) = self.description.runs.last_mut() {
+            run.skipped.push(line);
+        }
+        Ok(self.description.write(&self.session)?)
     }
 
     /// Takes the latest pose out again; gives its line of plan.csv.
@@ -125,11 +163,6 @@ impl Recorder {
     /// [`RecordError::Poses`].
     pub fn erase_last(&mut self) -> Result<Option<usize>, RecordError> {
         Ok(self.poses.as_mut().map_or(Ok(None), PoseFile::erase_last)?)
-    }
-
-    /// What was recorded, for facts that a run learns on its way; written when the run ends.
-    pub fn run_mut(&mut self) -> Option<&mut Run> {
-        self.description.runs.last_mut()
     }
 
     /// Notes that the port was lost.
@@ -175,6 +208,7 @@ impl Run {
             pairing: None,
             bar_mm: None,
             robot_link: None,
+            skipped: Vec::new(),
             temperature_c: None,
             rate_hz,
             poses: 0,

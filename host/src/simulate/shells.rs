@@ -142,6 +142,7 @@ impl Shells<'_> {
                 set: Some(tidy(mm_from_m(self.bar_m)).to_string()),
                 t_s: None,
                 bar_m: Some(self.bar_m),
+                motion: None,
                 file: 0,
                 line: 0,
             },

@@ -8,7 +8,7 @@ use super::record_error;
 use super::watch::RobotAndFrame;
 use crate::board::{Frame, RobotOnBoard, StreamTally};
 use crate::cmd::outcome::CommandError;
-use crate::session::Recorder;
+use crate::session::{MeasuredPose, Recorder};
 use crate::units::mm_from_m;
 
 /// The books of one run.
@@ -124,7 +124,7 @@ impl Account {
             return Ok(format!("settled {number}: counts {:?}, code {:.1}", pose.counts_mean.as_slice(), pose.code_mean));
         };
         let (q, displacement_m) = robot.settled(pose);
-        let joints = crate::cmd::port::joints_text(robot.kinds(), q.as_array());
+        let joints = crate::units::joints_text(robot.kinds(), q.as_array());
         let is_homed = robot.is_homed(stream.homed);
         let Some(displacement_m) = displacement_m else {
             return Ok(format!("settled {number}: {joints}, and the bar beyond its travel: no pose"));
@@ -159,7 +159,7 @@ impl Account {
             return Ok("; still where the last pose was written: not written again");
         }
         let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
-        recorder.pose(q, displacement_m, t_s, None).map_err(record_error)?;
+        recorder.poses(&[MeasuredPose { q, displacement_m, t_s, rate_m_s: None, plan_row: None }]).map_err(record_error)?;
         self.written += 1;
         self.last_written = Some(pose.clone());
         Ok("")

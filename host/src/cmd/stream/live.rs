@@ -1,17 +1,11 @@
-//! What is known of the arm at this moment, and the line that shows it.
-
-use std::io::{IsTerminal, Write, stderr};
-use std::time::{Duration, Instant};
+//! What is known of the arm at this moment, in numbers and in a line.
 
 use ballbar::wire::{Status, StreamedPose};
 use ballbar::{JointKind, LvdtReading, Sample, Stillness};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::super::port::joints_text;
-use super::super::table::fixed;
 use crate::board::RobotOnBoard;
-use crate::units::{ScreenUnit, mm_from_m};
+use crate::units::{ScreenUnit, fixed, joints_text, mm_from_m};
 
 /// The latest values, in the units of the screen.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -70,7 +64,7 @@ impl Latest {
         self.travel_left_mm = self.displacement_mm.map(|now| [now - mm_from_m(least), mm_from_m(most) - now]);
     }
 
-    fn text(&self, kinds: &[JointKind]) -> String {
+    pub(super) fn text(&self, kinds: &[JointKind]) -> String {
         let mut parts = Vec::new();
         match &self.q {
             Some(q) => {
@@ -91,59 +85,4 @@ impl Latest {
         parts.extend(self.stillness.map(str::to_owned));
         parts.join("  ")
     }
-}
-
-/// A line on stderr that is drawn anew on a terminal, and said once a second elsewhere.
-pub(super) struct LiveLine {
-    bar: Option<ProgressBar>,
-    shown: Instant,
-}
-
-const REDRAW: Duration = Duration::from_millis(100);
-const SAY: Duration = Duration::from_secs(1);
-
-impl LiveLine {
-    pub(super) fn new() -> Self {
-        let style = ProgressStyle::with_template("{wide_msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
-        let bar = stderr().is_terminal().then(|| ProgressBar::new_spinner().with_style(style));
-        Self { bar, shown: Instant::now() }
-    }
-
-    /// Shows the state, when it is time to.
-    pub(super) fn show(&mut self, head: impl FnOnce() -> String, latest: &Latest, kinds: &[JointKind]) {
-        let every = if self.bar.is_some() { REDRAW } else { SAY };
-        if self.shown.elapsed() < every {
-            return;
-        }
-        self.shown = Instant::now();
-        self.say(&format!("{}  {}", head(), latest.text(kinds)));
-    }
-
-    /// Says something that stays.
-    pub(super) fn note(&self, text: &str) {
-        match &self.bar {
-            Some(bar) => bar.suspend(|| say(text)),
-            None => say(text),
-        }
-    }
-
-    pub(super) fn clear(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
-
-    fn say(&self, text: &str) {
-        match &self.bar {
-            Some(bar) => {
-                bar.set_message(text.to_owned());
-                bar.tick();
-            }
-            None => say(text),
-        }
-    }
-}
-
-fn say(text: &str) {
-    let _ = writeln!(stderr(), "{text}");
 }

@@ -7,9 +7,9 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use super::account::Account;
-use super::live::LiveLine;
 use super::{FrameLine, StreamArgs, StreamReport, record_error};
 use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
+use crate::cmd::live_line::LiveLine;
 use crate::cmd::outcome::CommandError;
 use crate::cmd::port::EndRequest;
 use crate::session::BoardDescription;
@@ -144,11 +144,11 @@ impl<'a> Watch<'a> {
         let account = &self.account;
         let kinds = account.robot.as_ref().map_or(&[][..], RobotOnBoard::kinds);
         let losses = account.tally.losses();
-        let head = || {
+        self.line.show(|| {
             let rate = account.rate_hz().map_or(String::new(), |hz| format!("{hz:.0} Hz  "));
-            format!("{rate}settled {}  lost {}", account.settled, losses.missing + losses.overruns)
-        };
-        self.line.show(head, &account.latest, kinds);
+            let head = format!("{rate}settled {}  lost {}", account.settled, losses.missing + losses.overruns);
+            format!("{head}  {}", account.latest.text(kinds))
+        });
     }
 
     fn lose(&mut self, reason: &str) -> Result<(), CommandError> {

@@ -1,0 +1,229 @@
+//! `host-cal collect`: walk a plan and keep the poses.
+
+mod operator;
+mod report;
+mod session_files;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use miette::Diagnostic;
+use thiserror::Error;
+
+use super::inputs::{ListError, OutputArgs};
+use super::outcome::{CommandError, Outcome};
+use super::port::{EndRequest, PortArgs, StillnessArgs};
+use super::report::{print, warn};
+use super::stream::record_error;
+use crate::board::{BoardLink, RobotOnBoard};
+use crate::collect::{BoardWatch, CollectError, CollectOptions, Collector, Ledger, Nearness, TrackOptions, remove_lag};
+use crate::plan::{Cell, Margins, Pace};
+use crate::robot_link::sim::{SimClient, SimLink};
+use crate::robot_link::{JointSpeed, RobotLink};
+use crate::session::{Recorder, Run};
+use crate::units::m_from_mm;
+use operator::{Hand, KEYS, Terminal};
+use report::CollectReport;
+use session_files::SessionFiles;
+
+/// Walk a plan: move the robot from pose to pose, wait until it stands, and keep what the bar measures
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-cal collect /dev/ttyUSB0 --session today --plan plan.csv --robot design.toml --rig rig.toml --robot-link manual
+  host-cal collect /dev/ttyUSB0 --session today --robot-link sim --robot-address 127.0.0.1:7560
+
+A session that has begun needs no --plan, --robot and --rig: the same command goes on where it ended, after a crash or another day.
+At every change of the bar the command waits for Enter. Type and press Enter at any time:
+e = erase the last pose, s = skip the next one, p = pause, r = resume, q = quit.")]
+pub(super) struct CollectArgs {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Directory to record into; one that holds a begun collection is gone on with
+    #[arg(long, value_name = "DIR")]
+    session: PathBuf,
+    /// plan.csv, as `host-cal plan` writes it
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
+    /// The robot that the plan was made for: robot.toml, or a built-in
+    #[arg(long)]
+    robot: Option<String>,
+    /// rig.toml, or the built-in: triangles
+    #[arg(long)]
+    rig: Option<String>,
+    /// How the robot is moved
+    #[arg(long, value_enum)]
+    robot_link: LinkKind,
+    /// Where the robot's controller is: a network address or a serial port
+    #[arg(long, value_name = "ADDRESS")]
+    robot_address: Option<String>,
+    /// Speed of revolute joints
+    #[arg(long, value_name = "DEG/S", default_value_t = 30.0, allow_hyphen_values = true)]
+    speed_deg_s: f64,
+    /// Speed of prismatic joints
+    #[arg(long, value_name = "MM/S", default_value_t = 100.0, allow_hyphen_values = true)]
+    speed_mm_s: f64,
+    /// Measure while the robot moves slowly, instead of stopping at each pose
+    #[arg(long)]
+    continuous: bool,
+    /// With --continuous: speed of revolute joints while the bar is on
+    #[arg(long, value_name = "DEG/S", default_value_t = 5.0, allow_hyphen_values = true)]
+    slow_deg_s: f64,
+    /// With --continuous: speed of prismatic joints while the bar is on
+    #[arg(long, value_name = "MM/S", default_value_t = 20.0, allow_hyphen_values = true)]
+    slow_mm_s: f64,
+    /// With --continuous: time from one pose to the next, milliseconds
+    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u32).range(50..=60_000))]
+    every_ms: u32,
+    /// With manual and file: how near to a planned pose the arm has to stand, degrees and millimetres
+    #[arg(long, value_name = "DEG", default_value_t = 2.0, allow_hyphen_values = true)]
+    near_deg: f64,
+    /// Samples a second, 100 to 5000
+    #[arg(long, default_value_t = 500, value_name = "HZ", value_parser = clap::value_parser!(u16).range(100..=5_000))]
+    rate: u16,
+    #[command(flatten)]
+    stillness: StillnessArgs,
+    /// Do not return to one pose of every shell
+    #[arg(long)]
+    no_repeat: bool,
+    /// Ask for nothing: what attaches the bar does it by itself
+    #[arg(long)]
+    yes: bool,
+    /// Temperature, kept with the session, degrees Celsius
+    #[arg(long, value_name = "C")]
+    temperature_c: Option<f64>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LinkKind {
+    /// Somebody drives with the teach pendant, and the board sees where the robot is
+    Manual,
+    /// The simulated robot of `host-cal virtual-board --controller ADDRESS`
+    Sim,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+enum ArgumentError {
+    #[error("--robot-link {0} needs --robot-address")]
+    #[diagnostic(help("{1}"))]
+    NoAddress(&'static str, &'static str),
+    #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
+    #[diagnostic(help("Tell it the robot first: host-cal apply PORT --robot robot.toml --uncalibrated"))]
+    NoParameters,
+}
+
+impl CollectArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        let options = self.options()?;
+        let files = SessionFiles::open(&self.session, self.plan.as_deref(), self.robot.as_deref(), self.rig.as_deref())?;
+        let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
+        let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default())?;
+
+        let mut mover = self.mover(files.robot.chain.joints())?;
+        let mut link = self.port.connect()?;
+        let robot = RobotOnBoard::read(&mut link)?.ok_or(ArgumentError::NoParameters)?;
+        files.write()?;
+        let recorder = self.recorder(&link, &robot, mover.as_deref())?;
+        let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
+        let board = BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria())?;
+
+        let mut terminal = Terminal::new(self.hand()?, files.robot.chain.joint_kinds(), EndRequest::listen());
+        let began = Instant::now();
+        let mut collector = Collector::new(&cell, ledger, board, &mut terminal, options);
+        let ended = match mover.as_deref_mut() {
+            Some(mover) => collector.drive(mover),
+            None => collector.follow(self.nearness(), &mut |_| {}),
+        };
+        let (summary, ledger) = collector.end().map_err(collect_error)?;
+        terminal.clear();
+        let mut report = CollectReport::new(&self.session, &files, &ledger, &summary, &ended, began.elapsed());
+        if let Some(lag) = remove_lag(&self.session, &files.robot, &files.rig).map_err(collect_error)? {
+            report.set_lag(&lag);
+        }
+        print(&report, self.output.json)?;
+        ended.map_err(collect_error)?;
+        Ok(if report.is_complete() { Outcome::Good } else { Outcome::Doubtful })
+    }
+
+    fn options(&self) -> Result<CollectOptions, CommandError> {
+        let positive = |flag, value: f64| {
+            if value > 0.0 && value <= 1e6 {
+                return Ok(value);
+            }
+            Err(ListError::Number { flag, found: value.to_string(), expected: "a number above 0, at most 1e6" })
+        };
+        positive("--near-deg", self.near_deg)?;
+        let free_speed = JointSpeed {
+            revolute_rad_s: positive("--speed-deg-s", self.speed_deg_s)?.to_radians(),
+            prismatic_m_s: m_from_mm(positive("--speed-mm-s", self.speed_mm_s)?),
+        };
+        let slow = JointSpeed {
+            revolute_rad_s: positive("--slow-deg-s", self.slow_deg_s)?.to_radians(),
+            prismatic_m_s: m_from_mm(positive("--slow-mm-s", self.slow_mm_s)?),
+        };
+        let track = TrackOptions { every_s: f64::from(self.every_ms) * 1e-3, ..TrackOptions::default() };
+        Ok(CollectOptions {
+            speed: if self.continuous { slow } else { free_speed },
+            free_speed,
+            track: self.continuous.then_some(track),
+            repeat: !self.no_repeat,
+            ..CollectOptions::default()
+        })
+    }
+
+    /// What moves the robot; `None` when somebody does it by hand.
+    fn mover(&self, joints: usize) -> Result<Option<Box<dyn RobotLink>>, CommandError> {
+        Ok(match self.robot_link {
+            LinkKind::Manual => None,
+            LinkKind::Sim => Some(Box::new(SimLink::connect(self.sim_address()?, joints)?)),
+        })
+    }
+
+    fn sim_address(&self) -> Result<&str, ArgumentError> {
+        const HELP: &str = "It is the second line that host-cal virtual-board --controller 127.0.0.1:0 prints.";
+        self.robot_address.as_deref().ok_or(ArgumentError::NoAddress("sim", HELP))
+    }
+
+    fn hand(&self) -> Result<Hand, CommandError> {
+        Ok(match self.robot_link {
+            LinkKind::Sim => Hand::Sim(SimClient::connect(self.sim_address()?)?),
+            _ if self.yes => Hand::Nobody,
+            _ => {
+                warn(KEYS);
+                Hand::Person
+            }
+        })
+    }
+
+    fn nearness(&self) -> Nearness {
+        Nearness { turn_rad: self.near_deg.to_radians(), slide_m: m_from_mm(self.near_deg) }
+    }
+
+    fn recorder(
+        &self,
+        link: &BoardLink,
+        (robot, frame): &(RobotOnBoard, Vec<u8>),
+        mover: Option<&dyn RobotLink>,
+    ) -> Result<Recorder, CommandError> {
+        let run = Run {
+            rig: self.rig.clone(),
+            robot_link: Some(mover.map_or("manual".into(), RobotLink::name)),
+            temperature_c: self.temperature_c,
+            ..Run::beginning(link.port_name(), link.hello(), self.rate)
+        };
+        let mut recorder = Recorder::begin(&self.session, run, Some(robot.kinds())).map_err(record_error)?;
+        recorder.frame(link.hello_frame()).map_err(record_error)?;
+        recorder.frame(frame).map_err(record_error)?;
+        Ok(recorder)
+    }
+}
+
+/// What cannot be written is no bad input.
+fn collect_error(error: CollectError) -> CommandError {
+    match error {
+        CollectError::Record(error) => record_error(error),
+        error => error.into(),
+    }
+}

@@ -1,0 +1,140 @@
+//! Attaching the bar, and whether what is attached is what was asked for.
+
+use std::time::{Duration, Instant};
+
+use ballbar::JointVector;
+
+use super::collector::Collector;
+use super::errors::CollectError;
+use super::ledger::Joined;
+use super::operator::{Event, Wish};
+use crate::files::PairingId;
+use crate::units::{mm_from_m, tidy};
+
+/// How long the LVDT may take to show a bar that was attached.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// The operator is asked so often for the same connection.
+const ATTEMPTS: usize = 3;
+/// The bar is still moved by the hand that attached it for so long, by the board's clock.
+const STEADY_US: u64 = 200_000;
+
+impl Collector<'_, '_> {
+    /// Has the bar attached, and looks whether it is the right one. True when the operator wants to end instead.
+    pub(super) fn attach(&mut self, joined: Joined) -> Result<bool, CollectError> {
+        self.detach()?;
+        let connection = self.connection(joined);
+        for attempt in 1..=ATTEMPTS {
+            self.operator.tell(&Event::Attach(&connection))?;
+            if self.wait_for_confirmation()? {
+                return Ok(true);
+            }
+            match self.look_at_connection(joined) {
+                Ok(()) => {
+                    self.attached = Some(joined);
+                    self.board.recorder().connect(Some(connection.clone()));
+                    self.operator.tell(&Event::Attached(&connection))?;
+                    self.rearm()?;
+                    return Ok(false);
+                }
+                Err(wrong @ CollectError::WrongConnection { .. }) if attempt < ATTEMPTS => self.trouble(wrong.to_string())?,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(false)
+    }
+
+    /// Has the bar taken off, if it is on.
+    pub(super) fn detach(&mut self) -> Result<(), CollectError> {
+        if let Some(joined) = self.attached.take() {
+            let connection = self.connection(joined);
+            self.board.recorder().connect(None);
+            self.operator.tell(&Event::Detach(&connection))?;
+            self.wait_for_confirmation()?;
+        }
+        Ok(())
+    }
+
+    /// Whether the bar that the LVDT shows now, if any, can be this one at the arm's place.
+    pub(super) fn is_plausible(&mut self, joined: Joined) -> Result<bool, CollectError> {
+        let view = self.board.view()?;
+        Ok(view.displacement_m.is_some_and(|found_m| self.misfit(joined, &view.q, found_m) <= 1.0))
+    }
+
+    /// True when the operator wants to end.
+    fn wait_for_confirmation(&mut self) -> Result<bool, CollectError> {
+        loop {
+            self.listen()?;
+            match self.operator.wish() {
+                Some(Wish::Confirm | Wish::Resume) => return Ok(false),
+                Some(Wish::Quit) => return Ok(true),
+                _ => {}
+            }
+        }
+    }
+
+    fn look_at_connection(&mut self, joined: Joined) -> Result<(), CollectError> {
+        let began = Instant::now();
+        let mut shown_since_us = None;
+        while began.elapsed() < PATIENCE {
+            self.listen()?;
+            let view = self.board.view()?;
+            match view.displacement_m {
+                None => shown_since_us = None,
+                Some(found_m) => {
+                    let since_us = *shown_since_us.get_or_insert(view.t_us);
+                    if view.t_us - since_us >= STEADY_US {
+                        return self.judge(joined, &view.q, Some(found_m));
+                    }
+                }
+            }
+        }
+        let q = self.board.view()?.q;
+        self.judge(joined, &q, None)
+    }
+
+    fn judge(&self, joined: Joined, q: &JointVector<f64>, found_m: Option<f64>) -> Result<(), CollectError> {
+        if found_m.is_some_and(|found_m| self.misfit(joined, q, found_m) <= 1.0) {
+            return Ok(());
+        }
+        let (expected_m, reserve_m) = self.expected_m(joined, q);
+        let hint = match found_m.and_then(|found_m| self.better(joined, q, found_m)) {
+            Some(other) => format!("It looks like {}. Attach the bar as asked for, and confirm.", self.words(other)),
+            None => "Are both magnets on, is it the right extension rod? Attach the bar as asked for, and confirm.".into(),
+        };
+        Err(CollectError::WrongConnection {
+            connection: self.words(joined),
+            found: found_m.map_or("the LVDT shows no bar within its travel".into(), |found_m| {
+                format!("the LVDT shows {:+.1} mm from mid travel", mm_from_m(found_m))
+            }),
+            expected: format!("{:+.1} ± {:.1} mm", mm_from_m(expected_m), mm_from_m(reserve_m)),
+            hint,
+        })
+    }
+
+    /// Displacement that the model expects, and how far plausible robots may be off it, metres.
+    fn expected_m(&self, (pairing, bar_m): Joined, q: &JointVector<f64>) -> (f64, f64) {
+        let (length_m, reserve_m) = self.cell.length(q, &self.cell.rig.pairing(pairing));
+        (length_m - bar_m, reserve_m)
+    }
+
+    /// Distance of a displacement from the expected one, as a share of what is plausible.
+    fn misfit(&self, joined: Joined, q: &JointVector<f64>, found_m: f64) -> f64 {
+        let (expected_m, reserve_m) = self.expected_m(joined, q);
+        (found_m - expected_m).abs() / reserve_m
+    }
+
+    /// The connection of this rig that fits a displacement, and best.
+    fn better(&self, than: Joined, q: &JointVector<f64>, found_m: f64) -> Option<Joined> {
+        let rig = self.cell.rig;
+        let bars = rig.bar.iter().flat_map(|bar| bar.lengths_m.iter().copied());
+        let all: Vec<Joined> =
+            bars.flat_map(|bar_m| rig.all_pairings().into_iter().map(move |pairing: PairingId| (pairing, bar_m))).collect();
+        let misfit = |joined: &Joined| self.misfit(*joined, q, found_m);
+        let best = all.into_iter().filter(|joined| *joined != than).min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
+        (misfit(&best) <= 1.0).then_some(best)
+    }
+
+    fn words(&self, (pairing, bar_m): Joined) -> String {
+        format!("{} with the {} mm bar", self.cell.rig.pairing_name(pairing), tidy(mm_from_m(bar_m)))
+    }
+}

@@ -1,0 +1,201 @@
+//! The board during a collection: what it says is recorded, and its latest word kept.
+
+use std::time::{Duration, Instant};
+
+use ballbar::wire::{Answer, Command, Event, Status, Stream, StreamSelection, ToHost};
+use ballbar::{JointVector, Sample, SettledPose, StillnessCriteria};
+
+use super::errors::CollectError;
+use super::track::TrackPoint;
+use crate::board::{BoardLink, RobotOnBoard, StreamLosses, StreamTally};
+use crate::session::Recorder;
+
+/// The arm at the latest sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Time by the board's clock, microseconds.
+    pub t_us: u64,
+    /// Encoder outputs, radians or metres.
+    pub q: JointVector<f64>,
+    /// Displacement of the bar from mid travel, metres; `None` without a bar within its travel.
+    pub displacement_m: Option<f64>,
+    /// Whether all encoders of the joints are homed.
+    pub is_homed: bool,
+    /// Since when there is no bar within its travel, by the board's clock, microseconds.
+    pub off_since_us: Option<u64>,
+}
+
+/// A pose at which the arm stood still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stand {
+    /// Encoder outputs, means, radians or metres.
+    pub q: JointVector<f64>,
+    /// Mean displacement of the bar from mid travel, metres; `None` beyond it.
+    pub displacement_m: Option<f64>,
+    /// Beginning of the time of which this is the mean, by the board's clock, microseconds.
+    pub began_us: u64,
+    /// Middle of it, seconds.
+    pub t_s: f64,
+}
+
+/// A board that streams into a session.
+pub struct BoardWatch {
+    link: BoardLink,
+    robot: RobotOnBoard,
+    recorder: Recorder,
+    criteria: StillnessCriteria,
+    tally: StreamTally,
+    view: Option<View>,
+    stand: Option<Stand>,
+    track: Option<Vec<TrackPoint>>,
+    heard: Instant,
+}
+
+/// The stream has samples all the time: after this much silence something is wrong.
+const SILENCE: Duration = Duration::from_secs(3);
+
+impl BoardWatch {
+    /// Lets a board stream samples and settled poses.
+    ///
+    /// # Errors
+    /// [`CollectError`] when the board refuses or is gone.
+    pub fn begin(
+        mut link: BoardLink,
+        robot: RobotOnBoard,
+        recorder: Recorder,
+        rate_hz: u16,
+        criteria: StillnessCriteria,
+    ) -> Result<Self, CollectError> {
+        link.act(Command::SetRate { rate_hz })?;
+        link.act(Command::SetStillness(criteria))?;
+        link.start_stream(StreamSelection { samples: true, settled: true, poses: false })?;
+        let tally = StreamTally::default();
+        let heard = Instant::now();
+        Ok(Self { link, robot, recorder, criteria, tally, view: None, stand: None, track: None, heard })
+    }
+
+    /// The parameters that the board uses.
+    pub fn robot(&self) -> &RobotOnBoard {
+        &self.robot
+    }
+
+    /// The session.
+    pub fn recorder(&mut self) -> &mut Recorder {
+        &mut self.recorder
+    }
+
+    /// Takes one frame, or waits some milliseconds for one.
+    ///
+    /// # Errors
+    /// [`CollectError::Silent`], [`CollectError::Port`], [`CollectError::Record`].
+    pub fn listen(&mut self) -> Result<(), CollectError> {
+        let Some(frame) = self.link.next_frame()? else {
+            let silent = self.heard.elapsed();
+            if silent > SILENCE {
+                let port = self.link.port_name().to_owned();
+                return Err(CollectError::Silent { port, seconds: silent.as_secs_f64() });
+            }
+            return Ok(());
+        };
+        if let ToHost::Stream(stream) = &frame.message {
+            self.heard = Instant::now();
+            self.recorder.frame(&frame.bytes)?;
+            self.take(stream);
+        }
+        Ok(())
+    }
+
+    /// The latest sample; waits for the first one.
+    ///
+    /// # Errors
+    /// As [`BoardWatch::listen`].
+    pub fn view(&mut self) -> Result<View, CollectError> {
+        loop {
+            if let Some(view) = self.view {
+                return Ok(view);
+            }
+            self.listen()?;
+        }
+    }
+
+    /// The latest sample and no waiting.
+    pub fn latest(&self) -> Option<&View> {
+        self.view.as_ref()
+    }
+
+    /// The latest pose at which the arm stood still, once.
+    pub fn take_stand(&mut self) -> Option<Stand> {
+        self.stand.take()
+    }
+
+    /// Lets the board report the pose at which the arm stands now, although it may have done so before.
+    ///
+    /// # Errors
+    /// [`CollectError::Board`].
+    pub fn rearm(&mut self) -> Result<(), CollectError> {
+        self.link.act(Command::SetStillness(self.criteria))?;
+        self.stand = None;
+        Ok(())
+    }
+
+    /// From here on samples are kept; gives those kept so far.
+    pub(super) fn track(&mut self, is_on: bool) -> Vec<TrackPoint> {
+        std::mem::replace(&mut self.track, is_on.then(Vec::new)).unwrap_or_default()
+    }
+
+    /// Travel left inwards and outwards at a displacement, metres.
+    pub fn travel_left_m(&self, displacement_m: f64) -> [f64; 2] {
+        let (least_m, most_m) = self.robot.set().lvdt.travel_m::<f64>();
+        [displacement_m - least_m, most_m - displacement_m]
+    }
+
+    /// Ends stream and session; tells what was lost.
+    ///
+    /// # Errors
+    /// [`CollectError::Record`].
+    pub fn end(mut self) -> Result<StreamLosses, CollectError> {
+        // A board that is gone by now needs no end.
+        let _ = self.link.act(Command::StopStream);
+        let status = self.link.request(Command::Status);
+        while let Ok(Some(frame)) = self.link.next_frame() {
+            if let ToHost::Stream(stream) = &frame.message {
+                self.recorder.frame(&frame.bytes)?;
+                self.take(stream);
+            }
+        }
+        if let Ok(Answer::Status(status)) = status {
+            self.tally.end(&status as &Status);
+        }
+        self.recorder.end()?;
+        Ok(self.tally.losses())
+    }
+
+    fn take(&mut self, stream: &Stream) {
+        self.tally.take(stream);
+        let is_homed = self.robot.is_homed(stream.homed);
+        match &stream.event {
+            Event::Samples(batch) => batch.samples().for_each(|sample| self.take_sample(&sample, is_homed)),
+            Event::Settled(pose) => self.stand = Some(self.stand_of(pose)),
+            Event::Poses(_) => {}
+        }
+    }
+
+    fn take_sample(&mut self, sample: &Sample, is_homed: bool) {
+        let q = self.robot.q(sample.counts.iter().map(|&counts| f64::from(counts)));
+        let displacement_m = self.robot.displacement_m(sample.lvdt);
+        let off_since_us = match displacement_m {
+            Some(_) => None,
+            None => self.view.and_then(|view| view.off_since_us).or(Some(sample.t_us)),
+        };
+        self.view = Some(View { t_us: sample.t_us, q, displacement_m, is_homed, off_since_us });
+        if let (Some(track), Some(displacement_m)) = (&mut self.track, displacement_m) {
+            track.push(TrackPoint { t_s: sample.t_us as f64 * 1e-6, q, displacement_m });
+        }
+    }
+
+    fn stand_of(&self, pose: &SettledPose) -> Stand {
+        let (q, displacement_m) = self.robot.settled(pose);
+        let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
+        Stand { q, displacement_m, began_us: pose.t_us, t_s }
+    }
+}

@@ -1,0 +1,118 @@
+//! By how much the LVDT's signal comes late, from poses of an arm that moved.
+//!
+//! What is measured at `t` is the length of `t − τ`: `d_measured = d(q) − τ·ḋ`, to first order. `τ` is one more unknown beside the
+//! robot's parameters, with the column `−ḋ`: lengths that grow and lengths that shrink at the same place tell it from all of them.
+
+use std::path::Path;
+
+use ballbar::Parameter;
+use nalgebra::{DMatrix, DVector};
+
+use super::errors::CollectError;
+use crate::files::{Dataset, Problem, Rig, Robot};
+use crate::identify::{FitError, FitOptions, Identifiability, Observation, fit};
+use crate::session::{POSES_NAME, PoseFile, RecordError};
+
+/// The LVDT's lag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lag {
+    /// Seconds.
+    pub lag_s: f64,
+    /// Its standard deviation, seconds.
+    pub std_s: f64,
+}
+
+/// A lag that is not known better than this is left in the lengths: at 10 mm/s it makes 0.01 mm.
+const WORTH_REMOVING_S: f64 = 1e-3;
+/// The fit is good to first order, so the second round changes next to nothing.
+const ROUNDS: usize = 3;
+
+/// Estimates the lag of the poses that have a rate; `None` when there is none with one, or they cannot tell. Lengths are taken as
+/// measured, without the lag that was removed before.
+///
+/// # Errors
+/// [`FitError`] as of a fit.
+pub fn estimate_lag(robot: &Robot, dataset: &Dataset) -> Result<Option<Lag>, FitError> {
+    let rates: Vec<f64> = dataset.rows.iter().map(|row| row.motion.map_or(0.0, |motion| motion.rate_m_s)).collect();
+    if rates.iter().all(|rate| *rate == 0.0) {
+        return Ok(None);
+    }
+    let mut lag = Lag { lag_s: 0.0, std_s: f64::INFINITY };
+    for _ in 0..ROUNDS {
+        let corrected = dataset.with_lag_removed(lag.lag_s);
+        let solution = fit(robot, &corrected, &FitOptions::default())?;
+        let chain = &solution.solution.chain;
+        let measurements = corrected.measurements();
+        let held: [Parameter; 0] = [];
+        let subset = Identifiability::new(chain, &measurements, &robot.limits, &held).identified();
+        let observation = Observation::new(chain, &measurements);
+        let Some((more_s, std_s)) = solve_for_last(&observation.columns(&subset), &rates, &observation.residual_m) else {
+            return Ok(None);
+        };
+        lag = Lag { lag_s: lag.lag_s + more_s, std_s };
+    }
+    Ok(Some(lag))
+}
+
+/// Estimates the lag of a session's poses and removes it from their lengths; nothing changes when the poses cannot tell it.
+///
+/// # Errors
+/// [`CollectError::Poses`] when the poses cannot be read, [`CollectError::Record`] when they cannot be written.
+pub fn remove_lag(session: &Path, robot: &Robot, rig: &Rig) -> Result<Option<Lag>, CollectError> {
+    let path = session.join(POSES_NAME);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let dataset = match Dataset::read([path.as_path()], robot, rig) {
+        Ok(dataset) => dataset,
+        Err(error) if matches!(error.problem(), Problem::NoPoses) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    // Poses that no fit can be made of cannot tell a lag either.
+    let Ok(Some(lag)) = estimate_lag(robot, &dataset) else { return Ok(None) };
+    if lag.std_s > WORTH_REMOVING_S {
+        return Ok(None);
+    }
+    let mut file = PoseFile::open(&path, robot.chain.joint_kinds()).map_err(RecordError::from)?;
+    file.remove_lag(lag.lag_s).map_err(RecordError::from)?;
+    Ok(Some(lag))
+}
+
+/// Least squares over the columns and `−rates`; the value of the latter and its standard deviation.
+fn solve_for_last(columns: &DMatrix<f64>, rates: &[f64], residual: &DVector<f64>) -> Option<(f64, f64)> {
+    let (rows, parameters) = columns.shape();
+    let freedom = rows.checked_sub(parameters + 1).filter(|&freedom| freedom > 0)?;
+    let late = DVector::from_iterator(rows, rates.iter().map(|rate| -rate));
+    // What of the rates no parameter explains, and with it the lag alone: the same solution as of all unknowns together.
+    let basis = columns.clone().qr().q();
+    let rest = &late - &basis * basis.tr_mul(&late);
+    let square = rest.norm_squared();
+    if square <= 1e-12 * late.norm_squared() {
+        return None;
+    }
+    let unexplained = residual - &basis * basis.tr_mul(residual);
+    let lag_s = rest.dot(&unexplained) / square;
+    let noise = (&unexplained - &rest * lag_s).norm_squared() / freedom as f64;
+    Some((lag_s, (noise / square).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_unknown_is_found_beside_the_others() {
+        let columns = DMatrix::from_fn(40, 3, |row, column| ((row * (column + 2)) as f64 * 0.7).sin());
+        let rates: Vec<f64> = (0..40).map(|row| ((row * row) as f64).cos()).collect();
+        let residual = &columns * DVector::from_vec(vec![0.3, -2.0, 1.0]) - DVector::from_vec(rates.clone()) * 0.004;
+        let (lag_s, std_s) = solve_for_last(&columns, &rates, &residual).unwrap();
+        assert!((lag_s - 0.004).abs() < 1e-12 && std_s < 1e-12, "{lag_s} {std_s}");
+    }
+
+    #[test]
+    fn rates_that_a_parameter_mimics_tell_nothing() {
+        let columns = DMatrix::from_fn(10, 1, |row, _| row as f64);
+        let rates: Vec<f64> = (0..10).map(|row| 2.0 * row as f64).collect();
+        assert_eq!(solve_for_last(&columns, &rates, &DVector::zeros(10)), None);
+    }
+}

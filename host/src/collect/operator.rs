@@ -1,0 +1,106 @@
+//! Who attaches the bar and may interfere: a person, or whatever stands in for one.
+
+use std::time::Duration;
+
+use crate::robot_link::LinkError;
+use crate::session::Connection;
+
+/// What the operator wants, at any time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish {
+    /// What was asked for is done.
+    Confirm,
+    /// Take the latest pose out again; it is measured again.
+    EraseLast,
+    /// Do not measure the next row.
+    Skip,
+    /// Stand still after the move under way.
+    Pause,
+    /// Go on.
+    Resume,
+    /// End here; another run goes on.
+    Quit,
+}
+
+/// A pose that was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Line of plan.csv.
+    pub line: usize,
+    /// Poses of the plan measured so far, over all runs.
+    pub done: usize,
+    /// Poses of the plan.
+    pub all: usize,
+    /// The bar's length, metres.
+    pub length_m: f64,
+    /// Travel left inwards and outwards, metres.
+    pub travel_left_m: [f64; 2],
+    /// Measured less computed by the current model, metres.
+    pub residual_m: f64,
+    /// What is left to do, at the pace so far.
+    pub left: Duration,
+}
+
+/// What an operator is told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event<'a> {
+    /// Attach this, and confirm.
+    Attach(&'a Connection),
+    /// Take this off, and confirm.
+    Detach(&'a Connection),
+    /// The bar that is attached is what the plan asks for.
+    Attached(&'a Connection),
+    /// Drive the robot near these joint values (revolute joints radians, prismatic ones metres).
+    Drive {
+        /// Line of plan.csv.
+        line: usize,
+        /// Encoder outputs.
+        q: &'a ballbar::JointVector<f64>,
+    },
+    /// A pose was measured.
+    Measured(&'a Measured),
+    /// A row was not measured.
+    Missed {
+        /// Line of plan.csv.
+        line: usize,
+        /// Why.
+        why: &'a str,
+    },
+    /// The operator's wish was carried out.
+    Done(Wish),
+    /// Something went wrong, and is gone about.
+    Trouble(&'a str),
+    /// A pose was returned to; difference of the lengths, the encoders' difference taken out, metres.
+    Repeated(f64),
+    /// How the arm stands now; often.
+    Now(&'a super::View),
+}
+
+/// Who attaches the bar and may interfere.
+pub trait Operator {
+    /// Takes notice; for [`Event::Attach`] and [`Event::Detach`], sees to it that it is done.
+    ///
+    /// # Errors
+    /// [`LinkError`] when what attaches the bar is out of reach.
+    fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError>;
+
+    /// The next wish; does not wait for one.
+    fn wish(&mut self) -> Option<Wish>;
+}
+
+/// Nobody is there: every request counts as carried out.
+#[derive(Debug, Default)]
+pub struct Unattended {
+    asked: bool,
+}
+
+impl Operator for Unattended {
+    fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
+        self.asked |= matches!(event, Event::Attach(_) | Event::Detach(_));
+        Ok(())
+    }
+
+    fn wish(&mut self) -> Option<Wish> {
+        std::mem::take(&mut self.asked).then_some(Wish::Confirm)
+    }
+}
