@@ -19,7 +19,7 @@ use super::stream::record_error;
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{BoardWatch, CollectError, CollectOptions, Collector, Ledger, Nearness, TrackOptions, remove_lag};
 use crate::plan::{Cell, Margins, Pace};
-use crate::robot_link::sim::{SimClient, SimLink};
+use crate::robot_link::sim::{SimHand, SimLink};
 use crate::robot_link::{JointSpeed, RobotLink};
 use crate::session::{Recorder, Run};
 use crate::units::m_from_mm;
@@ -188,7 +188,7 @@ impl CollectArgs {
 
     fn hand(&self) -> Result<Hand, CommandError> {
         Ok(match self.robot_link {
-            LinkKind::Sim => Hand::Sim(SimClient::connect(self.sim_address()?)?),
+            LinkKind::Sim => Hand::Sim(SimHand::connect(self.sim_address()?)?),
             _ if self.yes => Hand::Nobody,
             _ => {
                 warn(KEYS);

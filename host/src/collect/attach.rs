@@ -15,13 +15,17 @@ use crate::units::{mm_from_m, tidy};
 const PATIENCE: Duration = Duration::from_secs(3);
 /// The operator is asked so often for the same connection.
 const ATTEMPTS: usize = 3;
+/// A bar that hangs free does not keep its length so well.
+const STILL_ON_M: f64 = 5e-5;
 /// The bar is still moved by the hand that attached it for so long, by the board's clock.
 const STEADY_US: u64 = 200_000;
 
 impl Collector<'_, '_> {
     /// Has the bar attached, and looks whether it is the right one. True when the operator wants to end instead.
     pub(super) fn attach(&mut self, joined: Joined) -> Result<bool, CollectError> {
-        self.detach()?;
+        if self.detach()? {
+            return Ok(true);
+        }
         let connection = self.connection(joined);
         for attempt in 1..=ATTEMPTS {
             self.operator.tell(&Event::Attach(&connection))?;
@@ -43,15 +47,30 @@ impl Collector<'_, '_> {
         Ok(false)
     }
 
-    /// Has the bar taken off, if it is on.
-    pub(super) fn detach(&mut self) -> Result<(), CollectError> {
-        if let Some(joined) = self.attached.take() {
-            let connection = self.connection(joined);
-            self.board.recorder().connect(None);
+    /// Has the bar taken off, if it is on. True when the operator wants to end instead.
+    pub(super) fn detach(&mut self) -> Result<bool, CollectError> {
+        let Some(joined) = self.attached else { return Ok(false) };
+        let connection = self.connection(joined);
+        self.board.recorder().connect(None);
+        let before_m = self.board.view()?.displacement_m;
+        for attempt in 1..=ATTEMPTS {
             self.operator.tell(&Event::Detach(&connection))?;
-            self.wait_for_confirmation()?;
+            if self.wait_for_confirmation()? {
+                return Ok(true);
+            }
+            let now_us = self.board.now_us()?;
+            let now_m = self.board.view_after(now_us)?.displacement_m;
+            let is_still_on = before_m.zip(now_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() < STILL_ON_M);
+            if !is_still_on {
+                break;
+            }
+            if attempt == ATTEMPTS {
+                return Err(CollectError::StillOn { connection: self.words(joined) });
+            }
+            self.trouble("the LVDT shows the same length as before: is the bar off?".into())?;
         }
-        Ok(())
+        self.attached = None;
+        Ok(false)
     }
 
     /// Whether the bar that the LVDT shows now, if any, can be this one at the arm's place.
@@ -73,11 +92,11 @@ impl Collector<'_, '_> {
     }
 
     fn look_at_connection(&mut self, joined: Joined) -> Result<(), CollectError> {
-        let began = Instant::now();
+        let (began, confirmed_us) = (Instant::now(), self.board.now_us()?);
         let mut shown_since_us = None;
         while began.elapsed() < PATIENCE {
             self.listen()?;
-            let view = self.board.view()?;
+            let view = self.board.view_after(confirmed_us)?;
             match view.displacement_m {
                 None => shown_since_us = None,
                 Some(found_m) => {

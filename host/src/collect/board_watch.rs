@@ -7,7 +7,7 @@ use ballbar::{JointVector, Sample, SettledPose, StillnessCriteria};
 
 use super::errors::CollectError;
 use super::track::TrackPoint;
-use crate::board::{BoardLink, RobotOnBoard, StreamLosses, StreamTally};
+use crate::board::{BoardError, BoardLink, RobotOnBoard, StreamLosses, StreamTally};
 use crate::session::Recorder;
 
 /// The arm at the latest sample.
@@ -128,14 +128,37 @@ impl BoardWatch {
         self.stand.take()
     }
 
-    /// Lets the board report the pose at which the arm stands now, although it may have done so before.
+    /// The board's time now, microseconds: what it says of earlier times may still be on its way.
     ///
     /// # Errors
     /// [`CollectError::Board`].
-    pub fn rearm(&mut self) -> Result<(), CollectError> {
+    pub fn now_us(&mut self) -> Result<u64, CollectError> {
+        match self.link.request(Command::Status)? {
+            Answer::Status(status) => Ok(status.uptime_us),
+            _ => Err(BoardError::WrongAnswer { command: "status" }.into()),
+        }
+    }
+
+    /// Lets the board report the pose at which the arm stands now, although it may have done so before. The board's time then.
+    ///
+    /// # Errors
+    /// [`CollectError::Board`].
+    pub fn rearm(&mut self) -> Result<u64, CollectError> {
         self.link.act(Command::SetStillness(self.criteria))?;
-        self.stand = None;
-        Ok(())
+        self.now_us()
+    }
+
+    /// The first sample after a time of the board's.
+    ///
+    /// # Errors
+    /// As [`BoardWatch::listen`].
+    pub fn view_after(&mut self, t_us: u64) -> Result<View, CollectError> {
+        loop {
+            if let Some(view) = self.view.filter(|view| view.t_us > t_us) {
+                return Ok(view);
+            }
+            self.listen()?;
+        }
     }
 
     /// From here on samples are kept; gives those kept so far.

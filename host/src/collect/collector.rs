@@ -217,8 +217,8 @@ impl<'a, 'o> Collector<'a, 'o> {
 
     /// From here on a pose counts only if the arm stands still anew.
     pub(super) fn rearm(&mut self) -> Result<(), CollectError> {
-        self.since_us = self.board.view()?.t_us;
-        self.board.rearm()
+        self.since_us = self.board.rearm()?;
+        Ok(())
     }
 
     /// Keeps a pose for a row, unless it cannot be one.

@@ -119,8 +119,8 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
     /// Goes from a row to a neighbouring one, the bar on or off as the plan has it.
     fn step(&mut self, here: usize, next: usize) -> Result<Step, CollectError> {
         let stays_on = self.collector.ledger.stays_on(here, next);
-        if stays_on.is_none() {
-            self.collector.detach()?;
+        if stays_on.is_none() && self.collector.detach()? {
+            return Ok(Step::Quit);
         }
         let mut words = String::new();
         for attempt in 0..=RETRIES {
@@ -174,8 +174,8 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
 
     /// One joint-interpolated move, watched.
     pub(super) fn go(&mut self, q: &JointVector<f64>, row: usize) -> Result<Go, CollectError> {
+        self.collector.since_us = self.collector.board.now_us()?;
         let from = self.collector.board.view()?;
-        self.collector.since_us = from.t_us;
         let options = &self.collector.options;
         let speed: JointSpeed = if self.collector.attached.is_some() { options.speed } else { options.free_speed };
         self.robot.start_move(q, &speed)?;

@@ -114,6 +114,13 @@ pub enum CollectError {
         /// What else it could be, and what to do.
         hint: String,
     },
+    /// The bar that should be off is on.
+    #[error("{connection}: the bar should be off, but the LVDT shows the same length as before")]
+    #[diagnostic(help("Take the bar off before the robot moves on, and run the same command again."))]
+    StillOn {
+        /// `A:1 with the 460 mm bar`.
+        connection: String,
+    },
     /// Row after row cannot be had.
     #[error("{count} rows in a row could not be measured, the last one line {line}: {why}")]
     #[diagnostic(help("Something is wrong for all of them. Run the same command again to go on."))]

@@ -120,6 +120,38 @@ impl SimClient {
     }
 }
 
+/// The hand that attaches the bar.
+pub struct SimHand(SimClient);
+
+/// Attaching takes a tenth of a second.
+const HAND_PATIENCE: Duration = Duration::from_secs(5);
+
+impl SimHand {
+    /// Connects to the controller.
+    ///
+    /// # Errors
+    /// [`LinkError::Unreachable`].
+    pub fn connect(address: &str) -> Result<Self, LinkError> {
+        SimClient::connect(address).map(Self)
+    }
+
+    /// Has something attached or taken off, and waits until it is.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn act(&mut self, request: &SimRequest) -> Result<(), LinkError> {
+        self.0.act(request)?;
+        let began = Instant::now();
+        while let SimReply::State { is_moving: true, .. } = self.0.ask(&SimRequest::State)? {
+            if began.elapsed() > HAND_PATIENCE {
+                return Err(LinkError::Lost { address: self.0.address.clone(), reason: "its time stands still".into() });
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(())
+    }
+}
+
 /// The simulated robot.
 pub struct SimLink {
     client: SimClient,

@@ -10,7 +10,7 @@ use crate::cmd::live_line::LiveLine;
 use crate::cmd::port::EndRequest;
 use crate::collect::{Event, Operator, View, Wish};
 use crate::robot_link::LinkError;
-use crate::robot_link::sim::{SimClient, SimRequest};
+use crate::robot_link::sim::{SimHand, SimRequest};
 use crate::session::Connection;
 use crate::units::{fixed, joints_text, mm_from_m, tidy};
 
@@ -25,7 +25,7 @@ pub(super) enum Hand {
     /// Nobody has to be asked.
     Nobody,
     /// The simulation's.
-    Sim(SimClient),
+    Sim(SimHand),
 }
 
 /// A person at the terminal, or none, with a hand.
@@ -56,14 +56,14 @@ impl Terminal {
         match &mut self.hand {
             Hand::Person => self.is_asked = true,
             Hand::Nobody => self.is_done = true,
-            Hand::Sim(client) => {
+            Hand::Sim(hand) => {
                 let request = match bar {
                     Some(Connection { chuck, sphere, bar_m }) => {
                         SimRequest::Attach { chuck: chuck.clone(), sphere: sphere.clone(), mid_m: *bar_m }
                     }
                     None => SimRequest::Detach,
                 };
-                client.act(&request)?;
+                hand.act(&request)?;
                 self.is_done = true;
             }
         }
