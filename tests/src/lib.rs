@@ -16,4 +16,6 @@ pub mod power_cut;
 pub mod raw_payload;
 #[cfg(unix)]
 pub mod scenarios;
+#[cfg(unix)]
+pub mod simulated_cell;
 pub mod wire_schema;

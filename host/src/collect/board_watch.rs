@@ -139,13 +139,15 @@ impl BoardWatch {
         }
     }
 
-    /// Lets the board report the pose at which the arm stands now, although it may have done so before. The board's time then.
+    /// Lets the board report the pose at which the arm stands now, although it may have done so before. A time of the board's between
+    /// the two.
     ///
     /// # Errors
     /// [`CollectError::Board`].
     pub fn rearm(&mut self) -> Result<u64, CollectError> {
+        let now_us = self.now_us()?;
         self.link.act(Command::SetStillness(self.criteria))?;
-        self.now_us()
+        Ok(now_us)
     }
 
     /// The first sample after a time of the board's.

@@ -5,12 +5,12 @@
 
 use std::path::Path;
 
-use ballbar::Parameter;
+use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement, Parameter};
 use nalgebra::{DMatrix, DVector};
 
 use super::errors::CollectError;
 use crate::files::{Dataset, Problem, Rig, Robot};
-use crate::identify::{FitError, FitOptions, Identifiability, Observation, fit};
+use crate::identify::{FitError, FitOptions, Identifiability, fit};
 use crate::session::{POSES_NAME, PoseFile, RecordError};
 
 /// The LVDT's lag.
@@ -45,10 +45,10 @@ pub fn estimate_lag(robot: &Robot, dataset: &Dataset) -> Result<Option<Lag>, Fit
         let measurements = corrected.measurements();
         let held: [Parameter; 0] = [];
         let subset = Identifiability::new(chain, &measurements, &robot.limits, &held).identified();
-        let observation = Observation::new(chain, &measurements);
-        let Some((more_s, std_s)) = solve_for_last(&observation.columns(&subset), &rates, &observation.residual_m) else {
-            return Ok(None);
-        };
+        let (columns, residual_m) = weighted_rows(chain, &measurements, &subset);
+        let late = measurements.iter().zip(&rates).map(|(measurement, rate)| -measurement.weight.sqrt() * rate);
+        let late = DVector::from_iterator(measurements.len(), late);
+        let Some((more_s, std_s)) = solve_for_last(&columns, &late, &residual_m) else { return Ok(None) };
         lag = Lag { lag_s: lag.lag_s + more_s, std_s };
     }
     Ok(Some(lag))
@@ -78,14 +78,29 @@ pub fn remove_lag(session: &Path, robot: &Robot, rig: &Rig) -> Result<Option<Lag
     Ok(Some(lag))
 }
 
-/// Least squares over the columns and `−rates`; the value of the latter and its standard deviation.
-fn solve_for_last(columns: &DMatrix<f64>, rates: &[f64], residual: &DVector<f64>) -> Option<(f64, f64)> {
+/// `√w J`, some of its columns, and `√w f`.
+fn weighted_rows(chain: &Chain<f64>, measurements: &[Measurement<f64>], subset: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
+    let kinematics = Kinematics::new(chain);
+    let mut columns = DMatrix::zeros(measurements.len(), subset.len());
+    let mut residual_m = DVector::zeros(measurements.len());
+    let mut row = [0.0; MAX_PARAMETERS];
+    for (i, measurement) in measurements.iter().enumerate() {
+        let root_weight = measurement.weight.sqrt();
+        residual_m[i] = root_weight * kinematics.residual_row(measurement, &mut row);
+        for (entry, &parameter) in columns.row_mut(i).iter_mut().zip(subset) {
+            *entry = root_weight * row[parameter];
+        }
+    }
+    (columns, residual_m)
+}
+
+/// Least squares over the columns and one more; the value of the latter and its standard deviation.
+fn solve_for_last(columns: &DMatrix<f64>, late: &DVector<f64>, residual: &DVector<f64>) -> Option<(f64, f64)> {
     let (rows, parameters) = columns.shape();
     let freedom = rows.checked_sub(parameters + 1).filter(|&freedom| freedom > 0)?;
-    let late = DVector::from_iterator(rows, rates.iter().map(|rate| -rate));
-    // What of the rates no parameter explains, and with it the lag alone: the same solution as of all unknowns together.
+    // What of it no parameter explains, and with it the lag alone: the same solution as of all unknowns together.
     let basis = columns.clone().qr().q();
-    let rest = &late - &basis * basis.tr_mul(&late);
+    let rest = late - &basis * basis.tr_mul(late);
     let square = rest.norm_squared();
     if square <= 1e-12 * late.norm_squared() {
         return None;
@@ -103,16 +118,16 @@ mod tests {
     #[test]
     fn the_last_unknown_is_found_beside_the_others() {
         let columns = DMatrix::from_fn(40, 3, |row, column| ((row * (column + 2)) as f64 * 0.7).sin());
-        let rates: Vec<f64> = (0..40).map(|row| ((row * row) as f64).cos()).collect();
-        let residual = &columns * DVector::from_vec(vec![0.3, -2.0, 1.0]) - DVector::from_vec(rates.clone()) * 0.004;
-        let (lag_s, std_s) = solve_for_last(&columns, &rates, &residual).unwrap();
+        let late = DVector::from_fn(40, |row, _| ((row * row) as f64).cos());
+        let residual = &columns * DVector::from_vec(vec![0.3, -2.0, 1.0]) + &late * 0.004;
+        let (lag_s, std_s) = solve_for_last(&columns, &late, &residual).unwrap();
         assert!((lag_s - 0.004).abs() < 1e-12 && std_s < 1e-12, "{lag_s} {std_s}");
     }
 
     #[test]
     fn rates_that_a_parameter_mimics_tell_nothing() {
         let columns = DMatrix::from_fn(10, 1, |row, _| row as f64);
-        let rates: Vec<f64> = (0..10).map(|row| 2.0 * row as f64).collect();
-        assert_eq!(solve_for_last(&columns, &rates, &DVector::zeros(10)), None);
+        let late = DVector::from_fn(10, |row, _| 2.0 * row as f64);
+        assert_eq!(solve_for_last(&columns, &late, &DVector::zeros(10)), None);
     }
 }

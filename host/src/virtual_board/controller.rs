@@ -113,7 +113,7 @@ impl Desk {
                 self.order_move(q, JointSpeed { revolute_rad_s: *revolute_rad_s, prismatic_m_s: *prismatic_m_s })
             }
             SimRequest::Halt => Ok(Order::Halt),
-            SimRequest::Detach => Ok(Order::Attach { bar: None, length_error_m: 0.0 }),
+            SimRequest::Detach => Ok(Order::Detach),
             SimRequest::Attach { chuck, sphere, mid_m } => self.order_attach(chuck, sphere, *mid_m),
         };
         match order {
@@ -155,7 +155,7 @@ impl Desk {
         if !(mid_m > 0.0 && mid_m.is_finite()) {
             return Err("the bar's length is not above zero".into());
         }
-        let bar = Some(AttachedBar { pairing: rig.pairing(PairingId { chuck, sphere }), mid_m });
+        let bar = AttachedBar { pairing: rig.pairing(PairingId { chuck, sphere }), mid_m };
         Ok(Order::Attach { bar, length_error_m: self.length_error_m() })
     }
 }

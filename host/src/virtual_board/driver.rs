@@ -23,13 +23,15 @@ pub enum Order {
         /// What the bar measures too much there, metres.
         length_error_m: f64,
     },
-    /// Attach another bar, or none, where the robot stands.
+    /// Attach another bar where the robot stands.
     Attach {
         /// The bar.
-        bar: Option<AttachedBar>,
+        bar: AttachedBar,
         /// What it measures too much there, metres.
         length_error_m: f64,
     },
+    /// The bar comes off, at once.
+    Detach,
     /// Stop on the way.
     Halt,
 }
@@ -107,8 +109,9 @@ fn begin(order: Order, plant: &mut Plant) {
     let (station, speed) = match order {
         Order::Move { q, speed, dwell_s, length_error_m } => (Station { q, bar, dwell_s, length_error_m }, speed),
         Order::Attach { bar, length_error_m } => {
-            (Station { q, bar, dwell_s: ATTACHING_S, length_error_m }, JointSpeed::default())
+            (Station { q, bar: Some(bar), dwell_s: ATTACHING_S, length_error_m }, JointSpeed::default())
         }
+        Order::Detach => return plant.drop_bar(),
         Order::Halt => return plant.halt(),
     };
     plant.play(Script { stations: vec![station], speed });

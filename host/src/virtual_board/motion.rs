@@ -119,6 +119,11 @@ impl Move {
         Self { to, held: Held::new(encoders, &now.q), until_us: t_us, ..*self }
     }
 
+    /// The bar comes off on the way.
+    pub(super) fn drop_bar(&mut self) {
+        (self.from.bar, self.to.bar) = (None, None);
+    }
+
     /// Standing at the station, after a move that is over.
     pub(super) fn arrive(&self, rng: &mut ChaCha8Rng) -> Rest {
         let station = self.to;

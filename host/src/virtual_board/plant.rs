@@ -180,6 +180,14 @@ impl Plant {
         }
     }
 
+    /// The bar comes off, wherever the robot is.
+    pub fn drop_bar(&mut self) {
+        match &mut self.phase {
+            Phase::Rest(rest) => rest.bar = None,
+            Phase::Move(movement) => movement.drop_bar(),
+        }
+    }
+
     /// Whether the last station's time was over at the latest call of [`Plant::at`]. The robot then stays there.
     pub fn is_done(&self) -> bool {
         self.waiting.is_empty() && matches!(&self.phase, Phase::Rest(rest) if rest.until_us <= self.now_us)

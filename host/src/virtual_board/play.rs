@@ -37,16 +37,20 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    /// Takes the value of now, and gives the one to show.
+    /// Takes the value of now, and gives the one to show: on the straight line between the two of around that time.
     pub(super) fn pass(&mut self, t_us: u64, now: Option<f64>) -> Option<f64> {
         if self.us == 0 {
             return now;
         }
         self.past.push_back((t_us, now));
-        while self.past.get(1).is_some_and(|(next_us, _)| next_us + self.us <= t_us) {
+        let shown_us = t_us.saturating_sub(self.us);
+        while self.past.get(1).is_some_and(|&(next_us, _)| next_us <= shown_us) {
             self.past.pop_front();
         }
-        self.past.front().and_then(|(_, value)| *value)
+        let &(before_us, before) = self.past.front()?;
+        let &(after_us, after) = self.past.get(1).filter(|_| before_us < shown_us).unwrap_or(&(before_us, before));
+        let share = (shown_us - before_us.min(shown_us)) as f64 / (after_us - before_us).max(1) as f64;
+        before.zip(after).map(|(before, after)| before + share * (after - before))
     }
 }
 
@@ -76,5 +80,9 @@ mod tests {
         let shown: Vec<Option<f64>> = (0..8).map(|ms| lag.pass(ms * 1_000, Some(ms as f64))).collect();
         assert_eq!(shown[4..], [Some(1.0), Some(2.0), Some(3.0), Some(4.0)]);
         assert_eq!(lag.past.len(), 4);
+        lag.us = 2_500;
+        assert_eq!(lag.pass(8_000, Some(8.0)), Some(5.5));
+        assert_eq!(lag.pass(9_000, None), Some(6.5));
+        assert_eq!(lag.pass(11_000, None), None);
     }
 }
