@@ -16,4 +16,5 @@ pub mod power_cut;
 pub mod raw_payload;
 #[cfg(unix)]
 pub mod scenarios;
+pub mod solids;
 pub mod wire_schema;

@@ -136,8 +136,8 @@ struct Columns {
 pub fn read_plan(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PlanRow>, InputError> {
     const HEADER: &str = "kind,chuck,sphere,bar_mm,q1_deg,…,qJ_deg,latitude_deg,longitude_deg,length_mm (qi_mm for a prismatic joint), \
                           then margins, as `host-cal plan` writes them";
-    let plain = ["kind", "chuck", "sphere", "bar_mm", "latitude_deg", "longitude_deg", "length_mm"];
-    let rows = CsvRows::split(source, robot, rig, &[&plain[..], &MARGINS].concat(), HEADER)?;
+    const REQUIRED: [&str; 7] = ["kind", "chuck", "sphere", "bar_mm", "latitude_deg", "longitude_deg", "length_mm"];
+    let rows = CsvRows::split(source, robot, rig, &REQUIRED, &MARGINS, HEADER)?;
     let columns = Columns {
         kind: rows.required("kind")?,
         chuck: rows.required("chuck")?,

@@ -66,10 +66,11 @@ struct Columns {
 
 /// All rows of one file, weighted alike.
 fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<Vec<PoseRow>, InputError> {
-    const COLUMNS: [&str; 6] = ["chuck", "sphere", "length_mm", "sigma_mm", "set", "t_s"];
+    const REQUIRED: [&str; 3] = ["chuck", "sphere", "length_mm"];
+    const OPTIONAL: [&str; 3] = ["sigma_mm", "set", "t_s"];
     const HEADER: &str =
         "chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); optional: sigma_mm, set, t_s";
-    let rows = CsvRows::split(source, robot, rig, &COLUMNS, HEADER)?;
+    let rows = CsvRows::split(source, robot, rig, &REQUIRED, &OPTIONAL, HEADER)?;
     let columns = Columns {
         chuck: rows.required("chuck")?,
         sphere: rows.required("sphere")?,
