@@ -184,6 +184,16 @@ fn a_plan_without_its_via_points_keeps_no_margins() {
 }
 
 #[test]
+fn links_too_thick_for_their_joint_are_not_looked_at_beside_one_another() {
+    // A PUMA's third link passes its first 149 mm off, in every posture.
+    let bench = Workbench::new();
+    bench.put("thick.toml", format!("{}\n[solids]\nlink_radius_mm = 70.0\n", workbench::RIG));
+    let (robot, rig) = (Robot::open("puma560").unwrap(), Rig::open(bench.path("thick.toml").to_str().unwrap()).unwrap());
+    let plan = planned(&robot, &rig, &options(&rig, &[("A", "1")], &[0.46], 6));
+    assert_eq!(plan.shells[0].measured, 6, "{:?}", plan.shells[0].hindrances);
+}
+
+#[test]
 fn the_same_seed_gives_the_same_plan_and_another_gives_another() {
     let (robot, rig) = (Robot::open("stanford").unwrap(), Rig::open("triangles").unwrap());
     let mut options = options(&rig, &[("A", "1"), ("B", "2")], &[0.46], 6);
@@ -272,7 +282,7 @@ struct Pool {
 
 fn pool(puma: &Puma) -> Pool {
     let poses = puma.shells(0.46, 40, 0.0, 4).rows;
-    let measurements: Vec<Measurement<f64>> = poses.iter().map(|pose| pose.measurement.clone()).collect();
+    let measurements: Vec<Measurement<f64>> = poses.iter().map(|pose| pose.measurement).collect();
     let subset = Expectation::new(&puma.design.chain, &measurements, &puma.design.limits).identified;
     let cell = Cell::new(&puma.design, &puma.rig, 0.075, Margins::default(), Pace::default()).unwrap();
     let row = |pose: &PoseRow| {
@@ -323,7 +333,7 @@ fn noise_at_the_tool_is_what_was_expected() {
     let puma = Puma::default();
     let pool = pool(&puma);
     let chosen = d_optimal(&pool.rows, 90);
-    let measurements: Vec<Measurement<f64>> = chosen.iter().map(|&i| pool.poses[i].measurement.clone()).collect();
+    let measurements: Vec<Measurement<f64>> = chosen.iter().map(|&i| pool.poses[i].measurement).collect();
     let quality = Quality::new(&puma.design.chain, &measurements, &puma.design.limits, &pool.subset).unwrap();
     let (expected_mm, found_mm) = (quality.amplification * SIGMA_MM, recovered_m(&puma, &pool, &chosen, 100) * 1e3);
     println!("expected {expected_mm:.3} mm, found {found_mm:.3} mm");

@@ -18,7 +18,8 @@ use crate::units::{m_from_mm, mm_from_m};
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-cal plan --robot puma560 --rig triangles --out plan.csv
-  host-cal plan --robot puma560 --rig triangles --bar 460 --pairings A:1,B:2,C:3 --optimal 120 --out plan.csv
+  host-cal plan --robot puma560 --rig triangles --bar 460 --pairings A:1,B:2,C:3 \\
+           --optimal 120 --out plan.csv
   host-cal plan --robot puma560 --rig triangles --check plan.csv
 
 Sizes of links, bar and fixtures are those of the rig's [solids] table (docs/files.md).")]

@@ -100,7 +100,7 @@ pub fn write_plan(robot: &Robot, rig: &Rig, rows: &[PlanRow]) -> String {
         match row.bar {
             Some(bar) => fields.extend([
                 number(bar.latitude_rad.to_degrees(), 4),
-                number(bar.longitude_rad.to_degrees(), 4),
+                number(below_a_turn(bar.longitude_rad.to_degrees()), 4),
                 number(mm_from_m(bar.length_m), 6),
             ]),
             None => fields.extend([const { String::new() }; 3]),
@@ -115,6 +115,12 @@ pub fn write_plan(robot: &Robot, rig: &Rig, rows: &[PlanRow]) -> String {
         text += &(csv_record(fields.into_iter()) + "\n");
     }
     text
+}
+
+/// What would be written as 360 degrees is 0.
+fn below_a_turn(longitude_deg: f64) -> f64 {
+    const ROUNDED_UP_DEG: f64 = 359.99995;
+    if longitude_deg < ROUNDED_UP_DEG { longitude_deg } else { 0.0 }
 }
 
 /// Where each column of a header stands.

@@ -195,7 +195,7 @@ fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn(usize) + Syn
     most_telling(cell.robot.chain.parameter_count(), in_one_piece(cell, all, options.seed))
 }
 
-fn all_tours(cell: &Cell<'_>, roads: &mut Vec<ShellRoads>, chosen: &[Vec<usize>]) -> Vec<Vec<Stop>> {
+fn all_tours(cell: &Cell<'_>, roads: &mut [ShellRoads], chosen: &[Vec<usize>]) -> Vec<Vec<Stop>> {
     let each: Vec<Mutex<&mut ShellRoads>> = roads.iter_mut().map(Mutex::new).collect();
     on_all_cores(each.len(), |i| {
         let mut road = each[i].lock().unwrap_or_else(PoisonError::into_inner);
