@@ -18,4 +18,5 @@ pub mod raw_payload;
 pub mod scenarios;
 #[cfg(unix)]
 pub mod simulated_cell;
+pub mod solids;
 pub mod wire_schema;

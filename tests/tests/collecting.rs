@@ -269,7 +269,7 @@ fn a_controller_that_claims_to_be_there_is_not_believed() {
     assert_eq!(measured_lines(&cell, "session").len(), before);
 
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert_all_measured(&cell, "session");
 }
 
@@ -292,7 +292,7 @@ fn a_move_that_faults_is_tried_again() {
     let mut crew = Crew::new(&cell);
     let mut link = Flawed::new(&cell, Flaw::Faults, 6, 2);
     let collected = cell.collect_with("session", Some(&mut link), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done, "{:?}", crew.told);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done, "{:?}", crew.told);
     assert_eq!(collected.summary.troubles.len(), 2, "{:?}", collected.summary.troubles);
     assert!(collected.summary.troubles[0].contains("*Envelope error*"));
     assert_all_measured(&cell, "session");
@@ -317,7 +317,7 @@ fn a_row_that_the_controller_refuses_is_gone_around() {
         Err(error) => panic!("{error}"),
     }
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert_all_measured(&cell, "session");
 }
 
@@ -329,7 +329,7 @@ fn a_controller_that_is_gone_ends_the_run_and_another_goes_on() {
     let collected = cell.collect_with("session", Some(&mut link), &mut crew, quick());
     assert!(matches!(collected.ended, Err(CollectError::Robot(LinkError::Lost { .. }))), "{:?}", collected.ended);
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert_all_measured(&cell, "session");
 }
 
@@ -339,7 +339,7 @@ fn a_bar_that_comes_off_stops_the_robot_and_is_attached_again() {
     let mut crew = Crew::new(&cell);
     let mut link = Flawed::new(&cell, Flaw::DropsBar, 7, 1);
     let collected = cell.collect_with("session", Some(&mut link), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done, "{:?}", crew.told);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done, "{:?}", crew.told);
     assert!(collected.summary.troubles.iter().any(|words| words.contains("the bar came off")));
     assert_all_measured(&cell, "session");
 
@@ -353,7 +353,7 @@ fn a_bar_that_is_attached_elsewhere_is_noticed() {
     let cell = cell();
     let mut crew = Crew { wrong: 1, ..Crew::new(&cell) };
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert!(collected.summary.troubles[0].contains("A:1 with the 460 mm bar"), "{:?}", collected.summary.troubles);
     assert_all_measured(&cell, "session");
 
@@ -368,7 +368,7 @@ fn a_bar_that_is_still_on_keeps_the_robot_where_it_is() {
     let cell = cell();
     let mut crew = Crew { left_on: 1, ..Crew::new(&cell) };
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert!(collected.summary.troubles.iter().any(|words| words.contains("is the bar off?")));
 
     let mut crew = Crew { left_on: 3, ..Crew::new(&cell) };
@@ -382,12 +382,12 @@ fn poses_can_be_erased_skipped_and_waited_with() {
     let wishes = [(3, Wish::EraseLast), (5, Wish::Skip), (7, Wish::Pause), (7, Wish::Resume), (12, Wish::Quit)];
     let mut crew = Crew::wishing(&cell, &wishes);
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Quit);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Quit);
     assert_eq!(collected.count(&RowState::Skipped), 1);
     assert_eq!(measured_lines(&cell, "session").len(), 11, "twelve measured, one of them erased and measured again");
 
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut Crew::new(&cell), quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     let mut lines = measured_lines(&cell, "session");
     lines.sort();
     lines.dedup();
@@ -449,7 +449,7 @@ fn a_robot_that_is_driven_by_hand_is_followed() {
     }
     let mut pendant = Pendant { driver: &mut drive, is_done: false };
     let collected = cell.collect_with("session", None, &mut pendant, quick());
-    assert_eq!(collected.ended.unwrap(), Ended::Done);
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert_all_measured(&cell, "session");
 }
 

@@ -155,6 +155,18 @@ pub(super) enum ListError {
     #[error("the rig names no bar length")]
     #[diagnostic(help("Give one, in millimetres: --bar 460"))]
     NoBar,
+    /// No travel to plan for.
+    #[error("the rig does not say how far the bar travels")]
+    #[diagnostic(help("Add to the rig's file, in millimetres: [bar] with lengths_mm = [460.0] and travel_mm = 75.0"))]
+    NoTravel,
+    /// A number that is there twice.
+    #[error("{flag} has {found} twice")]
+    Repeated {
+        /// The flag.
+        flag: &'static str,
+        /// What is there twice.
+        found: f64,
+    },
     /// A number that has to be above zero, or not below.
     #[error("{flag} is {found}, expected {expected}")]
     Number {

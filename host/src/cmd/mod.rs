@@ -19,6 +19,7 @@ mod lvdt;
 mod outcome;
 mod paper;
 mod plan;
+mod plan_margins;
 mod plan_report;
 mod port;
 mod ports;

@@ -7,9 +7,10 @@ use clap::Args;
 
 use super::inputs::{ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
-use super::plan_report::{CheckReport, Least, PlanReport};
+use super::plan_margins::{CheckReport, Least};
+use super::plan_report::PlanReport;
 use super::report::{print, progress, warn, write_file};
-use crate::files::{PlanRow, Rig, Robot, Source, read_plan, write_plan};
+use crate::files::{PlanRow, Rig, Robot, Source, check_writable, read_plan, write_plan};
 use crate::plan::{Cell, CheckFound, Grid, Margins, Pace, PlanOptions, check, plan};
 use crate::units::{m_from_mm, mm_from_m};
 
@@ -17,7 +18,8 @@ use crate::units::{m_from_mm, mm_from_m};
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-cal plan --robot puma560 --rig triangles --out plan.csv
-  host-cal plan --robot puma560 --rig triangles --bar 460 --pairings A:1,B:2,C:3 --optimal 120 --out plan.csv
+  host-cal plan --robot puma560 --rig triangles --bar 460 --pairings A:1,B:2,C:3 \\
+           --optimal 120 --out plan.csv
   host-cal plan --robot puma560 --rig triangles --check plan.csv
 
 Sizes of links, bar and fixtures are those of the rig's [solids] table (docs/files.md).")]
@@ -50,7 +52,7 @@ pub(super) struct PlanArgs {
     /// The same seed gives the same plan
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Write the plan to this file
+    /// Write the plan to this file; without it only the summary is printed, with --json the rows too
     #[arg(long, value_name = "FILE", conflicts_with = "check")]
     out: Option<PathBuf>,
     /// Make no plan, but look at this one once more
@@ -98,7 +100,7 @@ impl PlanArgs {
         let pace = self.pace.read()?;
         let robot = Robot::open(&self.robot)?;
         let rig = Rig::open(&self.rig)?;
-        let travel_m = rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
+        let travel_m = rig.bar.as_ref().ok_or(ListError::NoTravel)?.travel_m;
         if travel_m / 2.0 <= margins.travel_m {
             let expected = "less than half of the bar's travel";
             return Err(number("--travel-margin-mm", mm_from_m(margins.travel_m), expected).into());
@@ -121,6 +123,9 @@ impl PlanArgs {
             pace,
             seed: self.seed,
         };
+        if let Some(path) = &self.out {
+            check_writable(path).map_err(CommandError::output)?;
+        }
         let start = Instant::now();
         let bar = progress(options.ticks() as u64, "planning poses and ways");
         let plan = plan(robot, rig, &options, &|count| bar.inc(count as u64));
@@ -129,9 +134,8 @@ impl PlanArgs {
         let planning_s = start.elapsed().as_secs_f64();
         let found = self.checked(robot, rig, travel_m, margins, pace, &plan.rows)?;
 
-        let csv = write_plan(robot, rig, &plan.rows);
         if let Some(path) = &self.out {
-            write_file(path, &csv)?;
+            write_file(path, &write_plan(robot, rig, &plan.rows))?;
         }
         let report = PlanReport::new(robot, rig, &options, &plan, &found, planning_s, self.out.as_deref());
         for warning in &report.warnings {
@@ -177,6 +181,7 @@ impl PlanArgs {
         if let Some(bar) = self.bar.iter().find(|&&mm| !(mm > 0.0 && mm <= 1e6)) {
             return Err(number("--bar", *bar, "a number above 0, at most 1e6").into());
         }
+        no_repeats("--bar", &self.bar)?;
         if !self.bar.is_empty() {
             return Ok(self.bar.iter().map(|&mm| m_from_mm(mm)).collect());
         }
@@ -187,6 +192,7 @@ impl PlanArgs {
         if let Some(latitude) = self.latitudes_deg.iter().find(|&&deg| !(0.0..=90.0).contains(&deg)) {
             return Err(number("--latitudes-deg", *latitude, "numbers from 0 to 90").into());
         }
+        no_repeats("--latitudes-deg", &self.latitudes_deg)?;
         Ok(Grid::of(&self.latitudes_deg, self.per_pair as usize))
     }
 }
@@ -219,6 +225,14 @@ impl PaceArgs {
             slide_m_s: m_from_mm(speed("--speed-mm-s", self.speed_mm_s)?),
             settle_s: self.settle_s,
         })
+    }
+}
+
+fn no_repeats(flag: &'static str, numbers: &[f64]) -> Result<(), ListError> {
+    let is_repeated = |(i, number): &(usize, &f64)| numbers[..*i].contains(number);
+    match numbers.iter().enumerate().find(is_repeated) {
+        Some((_, &found)) => Err(ListError::Repeated { flag, found }),
+        None => Ok(()),
     }
 }
 

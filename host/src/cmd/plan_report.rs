@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use ballbar::JointKind;
 use serde::Serialize;
 
+use super::plan_margins::{Least, MarginLine};
 use super::report::Report;
 use super::table::{Columns, fixed};
-use crate::files::{PlanRow, Rig, Robot, RowKind};
-use crate::plan::{CheckFound, Comparison, Margins, Plan, PlanOptions, Quality, ShellSummary};
-use crate::units::{mm_from_m, tidy};
+use crate::files::{PlanRow, Rig, Robot, RowKind, RowMargins};
+use crate::plan::{CheckFound, Comparison, Plan, PlanOptions, Quality, ShellSummary};
+use crate::units::{ScreenUnit, mm_from_m, tidy};
 
 /// A plan, in numbers.
 #[derive(Serialize)]
@@ -39,6 +39,35 @@ pub(super) struct PlanReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<String>,
     pub(super) warnings: Vec<String>,
+    /// Empty when they went to a file.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    rows: Vec<RowLine>,
+}
+
+#[derive(Serialize)]
+struct RowLine {
+    kind: &'static str,
+    chuck: String,
+    sphere: String,
+    bar_mm: f64,
+    /// Degrees or millimetres.
+    q: Vec<f64>,
+    /// Of the bar, while it is attached.
+    latitude_deg: Option<f64>,
+    longitude_deg: Option<f64>,
+    length_mm: Option<f64>,
+    #[serde(flatten)]
+    margins: Option<RowMarginLine>,
+}
+
+#[derive(Serialize)]
+struct RowMarginLine {
+    travel_margin_mm: Option<f64>,
+    clearance_mm: f64,
+    nearest: String,
+    limit_margin_deg: Option<f64>,
+    limit_margin_mm: Option<f64>,
+    singularity: f64,
 }
 
 #[derive(Serialize)]
@@ -57,33 +86,6 @@ struct ShellLine {
 struct Reason {
     why: String,
     points: usize,
-}
-
-#[derive(Serialize)]
-struct MarginLine {
-    limit_deg: f64,
-    limit_mm: f64,
-    travel_mm: f64,
-    clearance_mm: f64,
-    singularity: f64,
-}
-
-/// Least margins that fine steps along the plan show.
-#[derive(Serialize)]
-pub(super) struct Least {
-    steps: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    limit_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    limit_mm: Option<f64>,
-    travel_mm: f64,
-    plausible_robots: usize,
-    plausible_travel_mm: f64,
-    clearance_mm: f64,
-    nearest: String,
-    /// From 1: the row to which the way leads on which the clearance is least.
-    nearest_row: usize,
-    singularity: f64,
 }
 
 #[derive(Serialize)]
@@ -142,6 +144,41 @@ impl From<&Comparison> for ComparisonLine {
     }
 }
 
+impl RowLine {
+    fn new(robot: &Robot, rig: &Rig, row: &PlanRow) -> Self {
+        let q = robot.chain.joint_kinds().iter().zip(row.q.as_array());
+        Self {
+            kind: match row.kind {
+                RowKind::Via => "via",
+                RowKind::Measure => "measure",
+            },
+            chuck: rig.chucks[row.pairing.chuck].name.clone(),
+            sphere: rig.spheres[row.pairing.sphere].name.clone(),
+            bar_mm: tidy(mm_from_m(row.bar_m)),
+            q: q.map(|(&kind, &q)| ScreenUnit::from(kind).from_si(q)).collect(),
+            latitude_deg: row.bar.map(|bar| bar.latitude_rad.to_degrees()),
+            longitude_deg: row.bar.map(|bar| bar.longitude_rad.to_degrees()),
+            length_mm: row.bar.map(|bar| mm_from_m(bar.length_m)),
+            margins: row.margins.as_ref().map(RowMarginLine::from),
+        }
+    }
+}
+
+impl From<&RowMargins> for RowMarginLine {
+    fn from(margins: &RowMargins) -> Self {
+        // Infinite where the robot has no joint of the kind.
+        let of_joints = |margin: f64| margin.is_finite().then_some(margin);
+        Self {
+            travel_margin_mm: margins.travel_m.map(mm_from_m),
+            clearance_mm: mm_from_m(margins.clearance_m),
+            nearest: margins.nearest.clone(),
+            limit_margin_deg: of_joints(margins.limit_rad.to_degrees()),
+            limit_margin_mm: of_joints(mm_from_m(margins.limit_m)),
+            singularity: margins.singularity,
+        }
+    }
+}
+
 impl ShellLine {
     fn new(rig: &Rig, shell: &ShellSummary) -> Self {
         let reason =
@@ -157,67 +194,18 @@ impl ShellLine {
             not_reached: shell.hindrances.iter().map(reason).collect(),
         }
     }
-}
 
-impl Least {
-    /// In the units of the screen; limits of the kinds of joints that the robot has.
-    pub(super) fn new(robot: &Robot, found: &CheckFound) -> Self {
-        let has = |kind| robot.chain.joint_kinds().contains(&kind);
-        Self {
-            steps: found.steps,
-            limit_deg: has(JointKind::Revolute).then(|| found.limit_rad.to_degrees()),
-            limit_mm: has(JointKind::Prismatic).then(|| mm_from_m(found.limit_m)),
-            travel_mm: mm_from_m(found.travel_m),
-            plausible_robots: found.plausible_robots,
-            plausible_travel_mm: mm_from_m(found.plausible_travel_m),
-            clearance_mm: mm_from_m(found.clearance_m),
-            nearest: found.nearest.to_string(),
-            nearest_row: found.nearest_row + 1,
-            singularity: found.singularity,
+    /// What hindered most, and how often something else did.
+    fn main_reasons(&self) -> String {
+        const SHOWN: usize = 2;
+        let mut reasons: Vec<&Reason> = self.not_reached.iter().collect();
+        reasons.sort_by_key(|reason| std::cmp::Reverse(reason.points));
+        let (main, others) = reasons.split_at(SHOWN.min(reasons.len()));
+        let mut words: Vec<String> = main.iter().map(|reason| format!("{} {}", reason.why, reason.points)).collect();
+        if !others.is_empty() {
+            words.push(format!("other {}", others.iter().map(|reason| reason.points).sum::<usize>()));
         }
-    }
-
-    fn text(&self, margins: &MarginLine) -> String {
-        let mut table = Columns::new(&["<margin", "asked for", "least found", "<where"]);
-        let mut line = |what: &str, asked: f64, least: f64, decimals: usize, place: String| {
-            table.row([what.to_owned(), fixed(asked, decimals), fixed(least, decimals), place]);
-        };
-        if let Some(limit_deg) = self.limit_deg {
-            line("to joint limits, deg", margins.limit_deg, limit_deg, 1, String::new());
-        }
-        if let Some(limit_mm) = self.limit_mm {
-            line("to slide limits, mm", margins.limit_mm, limit_mm, 1, String::new());
-        }
-        line("to the ends of travel, mm", margins.travel_mm, self.travel_mm, 1, "nominal robot".to_owned());
-        let robots = format!("worst of {} plausible robots", self.plausible_robots);
-        line("to the ends of travel, mm", margins.travel_mm, self.plausible_travel_mm, 1, robots);
-        let nearest = format!("{}, on the way to row {}", self.nearest, self.nearest_row);
-        line("between solids, mm", margins.clearance_mm, self.clearance_mm, 1, nearest);
-        line("from singularities", margins.singularity, self.singularity, 3, "measured poses".to_owned());
-        table.text()
-    }
-
-    fn is_kept(&self, margins: &MarginLine) -> bool {
-        // Nine decimals of a degree in the file.
-        const ROUNDING: f64 = 1e-6;
-        let keeps = |least: f64, asked: f64| least >= asked - ROUNDING;
-        self.limit_deg.is_none_or(|deg| keeps(deg, margins.limit_deg))
-            && self.limit_mm.is_none_or(|mm| keeps(mm, margins.limit_mm))
-            && keeps(self.travel_mm.min(self.plausible_travel_mm), margins.travel_mm)
-            && keeps(self.clearance_mm, margins.clearance_mm)
-            && keeps(self.singularity, margins.singularity)
-    }
-}
-
-impl From<&Margins> for MarginLine {
-    fn from(margins: &Margins) -> Self {
-        Self {
-            limit_deg: tidy(margins.limit_rad.to_degrees()),
-            limit_mm: tidy(mm_from_m(margins.limit_m)),
-            travel_mm: tidy(mm_from_m(margins.travel_m)),
-            clearance_mm: tidy(mm_from_m(margins.clearance_m)),
-            singularity: margins.singularity,
-        }
+        words.join(", ")
     }
 }
 
@@ -257,6 +245,10 @@ impl PlanReport {
             warnings: warnings(rig, plan, &least, &margins),
             margins,
             least,
+            rows: match out {
+                Some(_) => Vec::new(),
+                None => plan.rows.iter().map(|row| RowLine::new(robot, rig, row)).collect(),
+            },
         }
     }
 }
@@ -289,19 +281,17 @@ impl Report for PlanReport {
                 _ => "in closed form",
             }
         );
-        let mut table =
-            Columns::new(&["<pairing", "bar mm", "points", "reached", "measured", "vias", "min", "<not reached because"]);
+        let mut table = Columns::new(&["<pairing", "bar mm", "tried", "reached", "measured", "vias", "min", "<not reached"]);
         for shell in &self.shells {
-            let why: Vec<String> = shell.not_reached.iter().map(|reason| format!("{} {}", reason.why, reason.points)).collect();
             let counts = [shell.points, shell.reached, shell.measured, shell.vias].map(|count| count.to_string());
             let [points, reached, measured, vias] = counts;
             let minutes = fixed(shell.duration_s / 60.0, 1);
             let bar_mm = shell.bar_mm.to_string();
-            table.row([shell.pairing.clone(), bar_mm, points, reached, measured, vias, minutes, why.join(", ")]);
+            table.row([shell.pairing.clone(), bar_mm, points, reached, measured, vias, minutes, shell.main_reasons()]);
         }
         text += &table.text();
         text += &format!(
-            "\n{} of {} points reached; {} poses to measure, {} via points, the bar attached {} times\nexpected duration {} without attaching the bar; planned in {:.1} s\n\n",
+            "\n{} of {} points tried were reached; {} poses to measure, {} via points, the bar attached {} times\nexpected duration {} without attaching the bar; planned in {:.1} s\n\n",
             self.reached,
             self.points,
             self.poses,
@@ -316,9 +306,10 @@ impl Report for PlanReport {
             self.rank, self.parameters, self.independent_expected, self.condition
         );
         text += &self.quality_text();
-        if let Some(out) = &self.out {
-            text += &format!("\nwritten to {out}\n");
-        }
+        text += &match &self.out {
+            Some(out) => format!("\nwritten to {out}\n"),
+            None => "\nnot written; --out FILE writes the rows, --json prints them\n".to_owned(),
+        };
         text
     }
 }
@@ -351,48 +342,6 @@ impl PlanReport {
         }
         let choice = self.optimal.as_ref().map(|optimal| format!(", chosen from {}", optimal.pool)).unwrap_or_default();
         format!("\ninformation of the poses{choice}, each parameter in plausible deviations\n{}", table.text())
-    }
-}
-
-/// A plan that was looked at once more.
-#[derive(Serialize)]
-pub(super) struct CheckReport {
-    plan: String,
-    robot: String,
-    rows: usize,
-    poses: usize,
-    margins: MarginLine,
-    least: Least,
-    pub(super) is_kept: bool,
-}
-
-impl CheckReport {
-    pub(super) fn new(plan: &str, robot: &Robot, rows: &[PlanRow], least: Least, margins: &Margins) -> Self {
-        let margins = MarginLine::from(margins);
-        Self {
-            plan: plan.to_owned(),
-            robot: robot.name.clone(),
-            rows: rows.len(),
-            poses: rows.iter().filter(|row| row.kind == RowKind::Measure).count(),
-            is_kept: least.is_kept(&margins),
-            margins,
-            least,
-        }
-    }
-}
-
-impl Report for CheckReport {
-    fn text(&self) -> String {
-        let verdict = if self.is_kept { "All margins are kept." } else { "Margins are NOT kept." };
-        format!(
-            "{}: {} rows for {}, {} of them to measure; looked at in {} steps\n\n{}\n{verdict}\n",
-            self.plan,
-            self.rows,
-            self.robot,
-            self.poses,
-            self.least.steps,
-            self.least.text(&self.margins)
-        )
     }
 }
 

@@ -26,12 +26,14 @@ pub(super) struct CsvRows<'a> {
 }
 
 impl<'a> CsvRows<'a> {
-    /// Splits the text into records and checks the header against the robot's joints and the `other` columns.
+    /// Splits the text into records and checks the header: the robot's joints and the `required` columns must be there, the `optional`
+    /// ones may.
     pub(super) fn split(
         source: &'a Source,
         robot: &'a Robot,
         rig: &'a Rig,
-        other: &[&str],
+        required: &[&str],
+        optional: &[&str],
         expected_header: &'static str,
     ) -> Result<Self, InputError> {
         let mut reader =
@@ -42,7 +44,8 @@ impl<'a> CsvRows<'a> {
         }
         let header = reader.headers().map_err(broken)?.clone();
         let mut rows = Self { source, robot, rig, header, records: Vec::new(), expected_header };
-        rows.check_header(other)?;
+        rows.check_header(&[required, optional].concat())?;
+        required.iter().try_for_each(|name| rows.required(name).map(drop))?;
         for record in reader.records() {
             let record = record.map_err(broken)?;
             // A line of white space is as empty as an empty one.
@@ -126,14 +129,14 @@ impl<'a> CsvRows<'a> {
         self.refuse_row(&self.header, problem)
     }
 
-    fn check_header(&self, other: &[&str]) -> Result<(), InputError> {
+    fn check_header(&self, others: &[&str]) -> Result<(), InputError> {
         for (i, name) in self.header.iter().enumerate() {
             if self.header.iter().take(i).any(|other| other == name) {
                 return Err(self.refuse_header(Problem::Duplicate { what: "column", name: name.to_owned() }));
             }
         }
         self.check_joint_columns().map_err(|problem| self.refuse_header(problem))?;
-        let is_known = |name: &str| other.contains(&name) || self.joint_columns().any(|joint| joint == name);
+        let is_known = |name: &str| others.contains(&name) || self.joint_columns().any(|joint| joint == name);
         if let Some(name) = self.header.iter().find(|name| !is_known(name)) {
             let problem = Problem::UnknownColumn { name: name.to_owned(), expected: self.expected_header };
             return Err(self.refuse_header(problem));

@@ -24,4 +24,4 @@ pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{Calibration, EncoderFacts, JointLimits, NoEncoders, Robot};
 pub use solids::Solids;
 pub use source::{InputError, Source};
-pub use write::{WriteError, write_atomically, write_atomically_with};
+pub use write::{WriteError, check_writable, write_atomically, write_atomically_with};

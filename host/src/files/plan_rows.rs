@@ -100,7 +100,7 @@ pub fn write_plan(robot: &Robot, rig: &Rig, rows: &[PlanRow]) -> String {
         match row.bar {
             Some(bar) => fields.extend([
                 number(bar.latitude_rad.to_degrees(), 4),
-                number(bar.longitude_rad.to_degrees(), 4),
+                number(below_a_turn(bar.longitude_rad.to_degrees()), 4),
                 number(mm_from_m(bar.length_m), 6),
             ]),
             None => fields.extend([const { String::new() }; 3]),
@@ -115,6 +115,12 @@ pub fn write_plan(robot: &Robot, rig: &Rig, rows: &[PlanRow]) -> String {
         text += &(csv_record(fields.into_iter()) + "\n");
     }
     text
+}
+
+/// What would be written as 360 degrees is 0.
+fn below_a_turn(longitude_deg: f64) -> f64 {
+    const ROUNDED_UP_DEG: f64 = 359.99995;
+    if longitude_deg < ROUNDED_UP_DEG { longitude_deg } else { 0.0 }
 }
 
 /// Where each column of a header stands.
@@ -136,8 +142,8 @@ struct Columns {
 pub fn read_plan(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PlanRow>, InputError> {
     const HEADER: &str = "kind,chuck,sphere,bar_mm,q1_deg,…,qJ_deg,latitude_deg,longitude_deg,length_mm (qi_mm for a prismatic joint), \
                           then margins, as `host-cal plan` writes them";
-    let plain = ["kind", "chuck", "sphere", "bar_mm", "latitude_deg", "longitude_deg", "length_mm"];
-    let rows = CsvRows::split(source, robot, rig, &[&plain[..], &MARGINS].concat(), HEADER)?;
+    const REQUIRED: [&str; 7] = ["kind", "chuck", "sphere", "bar_mm", "latitude_deg", "longitude_deg", "length_mm"];
+    let rows = CsvRows::split(source, robot, rig, &REQUIRED, &MARGINS, HEADER)?;
     let columns = Columns {
         kind: rows.required("kind")?,
         chuck: rows.required("chuck")?,

@@ -81,11 +81,11 @@ struct Columns {
 
 /// All rows of one file, weighted alike.
 fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<Vec<PoseRow>, InputError> {
-    const COLUMNS: [&str; 10] =
-        ["chuck", "sphere", "length_mm", "sigma_mm", "set", "t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
+    const REQUIRED: [&str; 3] = ["chuck", "sphere", "length_mm"];
+    const OPTIONAL: [&str; 7] = ["sigma_mm", "set", "t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
     const HEADER: &str = "chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); \
                           optional: sigma_mm, set, t_s, bar_mm, plan_row, rate_mm_s, lag_ms";
-    let rows = CsvRows::split(source, robot, rig, &COLUMNS, HEADER)?;
+    let rows = CsvRows::split(source, robot, rig, &REQUIRED, &OPTIONAL, HEADER)?;
     let columns = Columns {
         chuck: rows.required("chuck")?,
         sphere: rows.required("sphere")?,

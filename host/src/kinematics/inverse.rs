@@ -52,7 +52,7 @@ impl Skeleton {
             let posture = self.at(&q);
             let pose = &posture.base_from_tool;
             let off_m = target.translation_m - pose.translation_m;
-            let turn = Rotation3::from_matrix_unchecked(target.rotation * pose.rotation.transpose()).scaled_axis();
+            let turn = rotation_vector(&(target.rotation * pose.rotation.transpose()));
             let error = Vector6::new(off_m.x, off_m.y, off_m.z, turn.x * TURN_M, turn.y * TURN_M, turn.z * TURN_M);
             if error.norm() < TOLERANCE {
                 return Some(q);
@@ -72,5 +72,17 @@ impl Skeleton {
             }
         }
         None
+    }
+}
+
+/// Axis times angle of a turn, to rounding also where the angle is small: the cosine alone would lose half of its digits there.
+fn rotation_vector(turn: &Matrix3<f64>) -> Vector3<f64> {
+    const NO_SINE: f64 = 1e-6;
+    let skew = Vector3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]) / 2.0;
+    let (sine, cosine) = (skew.norm(), (turn.trace() - 1.0) / 2.0);
+    match sine {
+        sine if sine > NO_SINE => skew * (sine.atan2(cosine) / sine),
+        _ if cosine > 0.0 => skew,
+        _ => Rotation3::from_matrix_unchecked(*turn).scaled_axis(),
     }
 }

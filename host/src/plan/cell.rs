@@ -5,7 +5,8 @@ use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::scene::{FixturesOverlap, Nearest, Scene};
+use super::contact::Nearest;
+use super::scene::{FixturesOverlap, Scene};
 use crate::files::{PairingId, Rig, Robot};
 use crate::identify::plausible_error;
 use crate::kinematics::{InverseKinematics, Posture};

@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::cell::Cell;
-use super::scene::Contact;
+use super::contact::Contact;
 use crate::files::{PlanRow, RowKind};
 
 /// Least margins over all rows and fine steps between them.

@@ -47,7 +47,9 @@ impl Grid {
     pub fn crossings(&self) -> Vec<Crossing> {
         let mut crossings = Vec::with_capacity(self.latitudes_rad.len() * self.longitudes);
         for (line, &latitude_rad) in self.latitudes_rad.iter().enumerate() {
-            let mut around: Vec<usize> = (0..self.longitudes).collect();
+            // All longitudes meet at the pole.
+            let is_pole = latitude_rad.cos() < 1e-9;
+            let mut around: Vec<usize> = (0..if is_pole { 1 } else { self.longitudes }).collect();
             if line % 2 == 1 {
                 around.reverse();
             }
@@ -69,6 +71,13 @@ impl Crossing {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_pole_is_one_point() {
+        let grid = Grid::of(&[45.0, 90.0], 8);
+        assert_eq!(grid.crossings().len(), 5);
+        assert_eq!(grid.between().iter().map(Vec::len).collect::<Vec<_>>(), [4, 8, 16]);
+    }
 
     #[test]
     fn crossings_are_distinct_and_as_many_as_asked_for() {

@@ -10,10 +10,14 @@
 
 mod cell;
 mod check;
+mod choice;
+mod contact;
+mod cores;
 mod experience;
 mod geometry;
 mod grid;
 mod growth;
+mod information;
 mod optimal;
 mod order;
 mod planner;
@@ -26,11 +30,12 @@ mod way;
 
 pub use cell::{Cell, LimitMargin, Margins, Pace, RESERVED_DEVIATIONS, plausible_deviation};
 pub use check::{Found as CheckFound, check};
+pub use contact::{Contact, Nearest};
 pub use geometry::{Disc, Segment};
 pub use grid::{Crossing, Grid};
 pub use optimal::d_optimal;
 pub use planner::{Comparison, Plan, PlanError, PlanOptions, ShellSummary, plan};
 pub use posture::Hindrance;
 pub use quality::{Expectation, Quality};
-pub use scene::{Contact, FixturesOverlap, Nearest, Scene};
+pub use scene::{FixturesOverlap, Scene};
 pub use way::way_between;

@@ -3,6 +3,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::information::information;
+
 /// Passes over the chosen poses at most; the last ones change little.
 const PASSES: usize = 20;
 
@@ -13,7 +15,7 @@ pub fn d_optimal(rows: &[Vec<f64>], count: usize) -> Vec<usize> {
     let all = DMatrix::from_fn(columns, rows.len(), |column, row| rows[row][column]);
     let mut chosen = greedy(&all, count.min(rows.len()));
     for _ in 0..PASSES {
-        if !exchange_pass(&all, &mut chosen) {
+        if !exchange_pass(rows, &all, &mut chosen) {
             break;
         }
     }
@@ -48,11 +50,10 @@ fn greedy(all: &DMatrix<f64>, count: usize) -> Vec<usize> {
 }
 
 /// Tries to exchange each chosen row, the least telling first, for the best of the others; whether any was.
-fn exchange_pass(all: &DMatrix<f64>, chosen: &mut [usize]) -> bool {
+fn exchange_pass(rows: &[Vec<f64>], all: &DMatrix<f64>, chosen: &mut [usize]) -> bool {
     const LEAST_GAIN: f64 = 1e-6;
-    let Some(mut inverse) = all.select_columns(&*chosen).transpose().qr().r().try_inverse().map(|r| &r * r.transpose()) else {
-        return false;
-    };
+    let told = information(chosen.iter().map(|&i| rows[i].as_slice()), all.nrows());
+    let Some(mut inverse) = told.cholesky().map(|factor| factor.inverse()) else { return false };
     let mut is_chosen = vec![false; all.ncols()];
     chosen.iter().for_each(|&i| is_chosen[i] = true);
     let leverage = |inverse: &DMatrix<f64>, i: usize| all.column(i).dot(&(inverse * all.column(i)));

@@ -1,18 +1,16 @@
 //! From shells to a plan: every shell by itself, on all cores; then the choice of poses, the tours and the moves between shells.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
+use std::sync::{Mutex, PoisonError};
 
 use ballbar::{JointVector, Measurement, Vector3};
 use miette::Diagnostic;
-use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use super::cell::{Cell, Margins, Pace};
-use super::experience::NOISE_M;
+use super::choice::{in_one_piece, most_telling};
+use super::cores::on_all_cores;
 use super::grid::Grid;
 use super::growth::{FAMILIES, Wanted, families};
 use super::optimal::d_optimal;
@@ -64,7 +62,8 @@ pub enum PlanError {
     /// No point of a shell can be measured.
     #[error("pairing {pairing}, bar {bar_mm} mm: none of {points} points can be measured: {why}")]
     #[diagnostic(help(
-        "Move the chucks nearer to the robot or away from its foot, take another bar length with --bar, or smaller margins."
+        "Move the chucks nearer to the robot or away from its foot, take another bar length with --bar, ask for smaller margins, or \
+         give the true sizes of links and fixtures in the rig's [solids] table."
     ))]
     OutOfReach {
         /// `chuck:sphere`.
@@ -178,31 +177,6 @@ pub fn plan(robot: &Robot, rig: &Rig, options: &PlanOptions, tick: &(dyn Fn(usiz
     Ok(plan)
 }
 
-/// Calls `work` for `0..jobs` on all cores; results in order.
-fn on_all_cores<T: Send>(jobs: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let next = AtomicUsize::new(0);
-    let results: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(jobs));
-    let cores = thread::available_parallelism().map_or(1, usize::from).min(jobs.max(1));
-    thread::scope(|scope| {
-        for _ in 0..cores {
-            scope.spawn(|| {
-                loop {
-                    let job = next.fetch_add(1, Ordering::Relaxed);
-                    if job >= jobs {
-                        break;
-                    }
-                    let result = work(job);
-                    // A panic elsewhere leaves the list as it was, and the scope passes it on.
-                    results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((job, result));
-                }
-            });
-        }
-    });
-    let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    results.sort_by_key(|(job, _)| *job);
-    results.into_iter().map(|(_, result)| result).collect()
-}
-
 fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn(usize) + Sync)) -> Vec<ShellRoads> {
     /// Postures at each point, for a choice to have a choice.
     const CHOICES_PER_CROSSING: usize = 3;
@@ -221,72 +195,10 @@ fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn(usize) + Syn
     most_telling(cell.robot.chain.parameter_count(), in_one_piece(cell, all, options.seed))
 }
 
-/// Without the families that the arm cannot come to from most others even with the bar off, where a shell has another: they lie in
-/// pockets that it cannot have come into.
-fn in_one_piece(cell: &Cell<'_>, all: Vec<Vec<ShellRoads>>, seed: u64) -> Vec<Vec<ShellRoads>> {
-    let mut pieces: Vec<(JointVector<f64>, usize)> = Vec::new();
-    let mut piece_of = |roads: &ShellRoads| -> Option<usize> {
-        let first = roads.nodes.first()?.q;
-        let is_joined = |(other, _): &(JointVector<f64>, usize)| transfer::free(cell, other, &first, seed).is_some();
-        let piece = pieces.iter().position(is_joined).unwrap_or_else(|| {
-            pieces.push((first, 0));
-            pieces.len() - 1
-        });
-        pieces[piece].1 += 1;
-        Some(piece)
-    };
-    let of: Vec<Vec<Option<usize>>> = all.iter().map(|families| families.iter().map(&mut piece_of).collect()).collect();
-    let largest = (0..pieces.len()).rev().max_by_key(|&piece| pieces[piece].1);
-    let keep = |(families, of): (Vec<ShellRoads>, Vec<Option<usize>>)| -> Vec<ShellRoads> {
-        let has_other = of.contains(&largest);
-        families.into_iter().zip(of).filter(|(_, piece)| !has_other || *piece == largest).map(|(roads, _)| roads).collect()
-    };
-    all.into_iter().zip(of).map(keep).collect()
-}
-
-/// Of each shell's families the one that tells most beside those of the other shells: the arm stands otherwise on different shells
-/// without the bar's being taken off more often.
-fn most_telling(parameters: usize, all: Vec<Vec<ShellRoads>>) -> Vec<ShellRoads> {
-    const SWEEPS: usize = 5;
-    let information = |roads: &ShellRoads| {
-        let rows = roads.one_per_crossing().into_iter().map(|node| &roads.nodes[node].row[..parameters]);
-        rows.fold(DMatrix::zeros(parameters, parameters), |mut sum, row| {
-            let row = DVector::from_column_slice(row) / NOISE_M;
-            sum.ger(1.0, &row, &row, 1.0);
-            sum
-        })
-    };
-    let each: Vec<Vec<DMatrix<f64>>> = all.iter().map(|families| families.iter().map(information).collect()).collect();
-    let mut chosen = vec![0; all.len()];
-    let first = each.iter().filter_map(|families| families.first());
-    let mut sum = first.fold(DMatrix::identity(parameters, parameters), |sum, one| sum + one);
-    for _ in 0..SWEEPS {
-        let before = chosen.clone();
-        for (shell, families) in each.iter().enumerate().filter(|(_, families)| families.len() > 1) {
-            let others = &sum - &families[chosen[shell]];
-            let told = |family: &DMatrix<f64>| log_determinant(&others + family);
-            let best = (0..families.len()).max_by(|&a, &b| told(&families[a]).total_cmp(&told(&families[b])));
-            chosen[shell] = best.unwrap_or(chosen[shell]);
-            sum = others + &families[chosen[shell]];
-        }
-        if chosen == before {
-            break;
-        }
-    }
-    all.into_iter()
-        .zip(chosen)
-        .filter_map(|(mut families, best)| (best < families.len()).then(|| families.swap_remove(best)))
-        .collect()
-}
-
-fn log_determinant(information: DMatrix<f64>) -> f64 {
-    information.cholesky().map_or(f64::NEG_INFINITY, |factor| factor.l().diagonal().iter().map(|pivot| pivot.ln()).sum())
-}
-
-fn all_tours(cell: &Cell<'_>, roads: &mut Vec<ShellRoads>, chosen: &[Vec<usize>]) -> Vec<Vec<Stop>> {
+fn all_tours(cell: &Cell<'_>, roads: &mut [ShellRoads], chosen: &[Vec<usize>]) -> Vec<Vec<Stop>> {
     let each: Vec<Mutex<&mut ShellRoads>> = roads.iter_mut().map(Mutex::new).collect();
     on_all_cores(each.len(), |i| {
-        let mut road = each[i].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut road = each[i].lock().unwrap_or_else(PoisonError::into_inner);
         road.tour(cell, &chosen[i])
     })
 }
@@ -356,7 +268,7 @@ fn assemble(cell: &Cell<'_>, roads: &[ShellRoads], grid: &[Vec<usize>], tours: V
                 Stop::Measure(node) => (RowKind::Measure, road.nodes[*node].q),
             })
             .collect();
-        let last = rows.last().map(|row| row.q);
+        let last = rows.last().map(|row| row.q).filter(|_| !stops.is_empty());
         // Either end of the tour may be its beginning.
         if let (Some(last), Some((_, first)), Some((_, end))) = (last, stops.first(), stops.last())
             && cell.seconds(&last, end) < cell.seconds(&last, first)

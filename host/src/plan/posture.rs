@@ -11,8 +11,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::cell::Cell;
+use super::contact::Contact;
 use super::grid::Crossing;
-use super::scene::Contact;
 use crate::files::PairingId;
 use crate::kinematics::Thoroughness;
 

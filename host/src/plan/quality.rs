@@ -1,11 +1,12 @@
 //! How well a set of poses will tell the parameters, before any is measured.
 
-use ballbar::{Chain, FreeParameters, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Parameter, Vector3};
+use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement, Parameter, Vector3};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cell::plausible_deviation;
+use super::information::information;
 use crate::files::JointLimits;
 use crate::identify::{Identifiability, Observation, Spectrum};
 
@@ -64,17 +65,16 @@ impl Quality {
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], subset: &[usize]) -> Option<Self> {
         const MM: f64 = 1e3;
         let kinematics = Kinematics::new(chain);
-        let mut normal = NormalEquations::new(FreeParameters::from_indices(subset.iter().copied()).ok()?);
-        let mut row = [0.0; MAX_PARAMETERS];
-        for measurement in measurements {
-            kinematics.residual_row(measurement, &mut row);
-            normal.add(&row, 0.0, 1.0);
-        }
         let scales: Vec<f64> =
             subset.iter().map(|&index| MM * plausible_deviation(chain.unit(Parameter::from_index(index)))).collect();
+        let scaled_row = |measurement: &Measurement<f64>| -> Vec<f64> {
+            let mut row = [0.0; MAX_PARAMETERS];
+            kinematics.residual_row(measurement, &mut row);
+            subset.iter().zip(&scales).map(|(&index, scale)| row[index] * scale).collect()
+        };
+        let rows: Vec<Vec<f64>> = measurements.iter().map(scaled_row).collect();
         let count = subset.len();
-        let information = DMatrix::from_fn(count, count, |i, j| scales[i] * scales[j] * normal.entry(i, j).unwrap_or_default());
-        let eigen = information.symmetric_eigen();
+        let eigen = information(rows.iter().map(Vec::as_slice), count).symmetric_eigen();
         let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
         // Below this an eigenvalue of JᵀJ is rounding.
         if count == 0 || least <= 1e-13 * most {

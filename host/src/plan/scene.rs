@@ -1,73 +1,20 @@
 //! What stands about the bar, and how near it comes to it: robot, table and fixtures as simple solids.
 
-use std::fmt;
-
-use ballbar::{JointKind, Vector3};
+use ballbar::{JointKind, JointVector, Vector3};
 use miette::Diagnostic;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
+use super::contact::{Contact, Nearest};
 use super::geometry::{Disc, Segment};
 use crate::files::{NamedPoint, PairingId, Rig, Robot, Solids};
 use crate::kinematics::{Posture, Skeleton};
 use crate::units::mm_from_m;
 
-/// Two things that come near one another. Links are counted from 1, as in the robot's file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Contact {
-    /// Bar and table.
-    BarTable,
-    /// Bar and the plate that carries the chucks.
-    BarChuckPlate,
-    /// Bar and a chuck that it is not in.
-    BarChuck,
-    /// Bar and the plate that carries the spheres.
-    BarSpherePlate,
-    /// Bar and a sphere that it is not on.
-    BarSphere,
-    /// Bar and a link.
-    BarLink(usize),
-    /// A link and the table.
-    LinkTable(usize),
-    /// A link and the chucks or their plate.
-    LinkChucks(usize),
-    /// Two links.
-    Links(usize, usize),
-    /// The plate with the spheres, and table or chucks.
-    ToolTable,
-    /// The plate with the spheres, and a link.
-    ToolLink(usize),
-}
-
-impl fmt::Display for Contact {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::BarTable => f.write_str("bar near table"),
-            Self::BarChuckPlate => f.write_str("bar near chuck plate"),
-            Self::BarChuck => f.write_str("bar near another chuck"),
-            Self::BarSpherePlate => f.write_str("bar near sphere plate"),
-            Self::BarSphere => f.write_str("bar near another sphere"),
-            Self::BarLink(link) => write!(f, "bar near link {link}"),
-            Self::LinkTable(link) => write!(f, "link {link} near table"),
-            Self::LinkChucks(link) => write!(f, "link {link} near chucks"),
-            Self::Links(a, b) => write!(f, "link {a} near link {b}"),
-            Self::ToolTable => f.write_str("tool near table or chucks"),
-            Self::ToolLink(link) => write!(f, "tool near link {link}"),
-        }
-    }
-}
-
-/// The two things that are nearest to one another, surface to surface; below zero they meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest {
-    /// Gap between their surfaces, metres.
-    pub gap_m: f64,
-    /// Which.
-    pub contact: Contact,
-}
-
 /// The rig cannot be as it is described.
 #[derive(Clone, Debug, PartialEq, Error, Diagnostic)]
-#[error("{one} and {other} overlap: {gap_mm:.1} mm between them, expected {wanted_mm:.1} mm or more")]
+#[error("{one} and {other} are too near: {gap_mm:.1} mm between them, expected {wanted_mm:.1} mm or more")]
 #[diagnostic(help("Check the positions in rig.toml, or give the true sizes in its [solids] table (docs/files.md)."))]
 pub struct FixturesOverlap {
     one: String,
@@ -104,8 +51,8 @@ pub struct Scene {
     bodies: Vec<Body>,
     /// Bodies that may come near one another, as indices; those that share a joint always do.
     body_pairs: Vec<(usize, usize)>,
-    /// The first body that may come near the plate with the spheres is below this index.
-    tool_bodies: usize,
+    /// Bodies that may come near the plate with the spheres.
+    tool_bodies: Vec<usize>,
     table_z_m: f64,
     chuck_plate: Disc,
     chucks_m: Vec<Vector3<f64>>,
@@ -134,17 +81,18 @@ impl Scene {
             solids.sphere_plate_behind_m,
             solids.sphere_radius_m + solids.sphere_plate_rim_m,
         );
-        let scene = Self {
+        let mut scene = Self {
             table_z_m: lowest_m - solids.table_below_chucks_m,
             solids,
             bodies,
             body_pairs,
-            tool_bodies,
+            tool_bodies: (0..tool_bodies).collect(),
             chuck_plate,
             chucks_m,
             sphere_plate_tool,
             spheres_tool_m,
         };
+        scene.forget_inseparable(robot, &skeleton, clearance_m);
         scene.check_fixtures(rig, &skeleton.at(&ballbar::JointVector::zero()), clearance_m)?;
         Ok(scene)
     }
@@ -162,7 +110,7 @@ impl Scene {
 
     /// The nearest two things at a posture, with the bar on the pairing, or without the bar.
     pub fn nearest(&self, posture: &Posture, attached: Option<PairingId>) -> Nearest {
-        let segments: heapless::Vec<Segment, MAX_BODIES> = self.bodies.iter().map(|body| body.segment(posture)).collect();
+        let segments = self.segments(posture);
         let mut nearest = Nearest { gap_m: f64::INFINITY, contact: Contact::ToolTable };
         let mut see = |gap_m: f64, contact: Contact| {
             if gap_m < nearest.gap_m {
@@ -176,6 +124,39 @@ impl Scene {
         nearest
     }
 
+    fn segments(&self, posture: &Posture) -> heapless::Vec<Segment, MAX_BODIES> {
+        self.bodies.iter().map(|body| body.segment(posture)).collect()
+    }
+
+    /// Two bodies that are near one another in every posture are parts of one joint that plain capsules are too wide for.
+    fn forget_inseparable(&mut self, robot: &Robot, skeleton: &Skeleton, clearance_m: f64) {
+        const POSTURES: usize = 300;
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let postures: Vec<_> = (0..POSTURES)
+            .map(|_| {
+                let mut q = JointVector::zero();
+                for (value, limits) in q.as_array_mut().iter_mut().zip(&robot.limits) {
+                    *value = rng.random_range(limits.min..limits.max);
+                }
+                let posture = skeleton.at(&q);
+                (self.segments(&posture), self.sphere_plate(&posture))
+            })
+            .collect();
+        let (mut body_pairs, mut tool_bodies) = (std::mem::take(&mut self.body_pairs), std::mem::take(&mut self.tool_bodies));
+        body_pairs.retain(|&(a, b)| postures.iter().any(|(segments, _)| self.links_gap_m(segments, a, b) >= clearance_m));
+        tool_bodies
+            .retain(|&body| postures.iter().any(|(segments, plate)| self.tool_gap_m(segments, plate, body) >= clearance_m));
+        (self.body_pairs, self.tool_bodies) = (body_pairs, tool_bodies);
+    }
+
+    fn links_gap_m(&self, segments: &[Segment], a: usize, b: usize) -> f64 {
+        segments[a].distance_to_segment(&segments[b]) - self.bodies[a].radius_m - self.bodies[b].radius_m
+    }
+
+    fn tool_gap_m(&self, segments: &[Segment], plate: &Disc, body: usize) -> f64 {
+        plate.distance_to_segment(&segments[body]) - self.bodies[body].radius_m
+    }
+
     fn see_bar(&self, posture: &Posture, segments: &[Segment], pairing: PairingId, see: &mut impl FnMut(f64, Contact)) {
         let radius_m = self.solids.bar_radius_m;
         let sphere = |index: usize| posture.point_in_base(&self.spheres_tool_m[index]);
@@ -183,8 +164,7 @@ impl Scene {
         see(bar.from_m.z.min(bar.to_m.z) - self.table_z_m - radius_m, Contact::BarTable);
         see(self.chuck_plate.distance_to_segment(&bar) - radius_m, Contact::BarChuckPlate);
         see(self.sphere_plate(posture).distance_to_segment(&bar) - radius_m, Contact::BarSpherePlate);
-        for (i, chuck_m) in self.chucks_m.iter().enumerate().filter(|(i, _)| *i != pairing.chuck) {
-            debug_assert_ne!(i, pairing.chuck);
+        for (_, chuck_m) in self.chucks_m.iter().enumerate().filter(|(i, _)| *i != pairing.chuck) {
             see(bar.distance_to_point(chuck_m) - radius_m - self.solids.chuck_radius_m, Contact::BarChuck);
         }
         for i in (0..self.spheres_tool_m.len()).filter(|&i| i != pairing.sphere) {
@@ -207,8 +187,7 @@ impl Scene {
             }
         }
         for &(a, b) in &self.body_pairs {
-            let gap_m = segments[a].distance_to_segment(&segments[b]) - self.bodies[a].radius_m - self.bodies[b].radius_m;
-            see(gap_m, Contact::Links(self.bodies[a].link + 1, self.bodies[b].link + 1));
+            see(self.links_gap_m(segments, a, b), Contact::Links(self.bodies[a].link + 1, self.bodies[b].link + 1));
         }
         let plate = self.sphere_plate(posture);
         see(plate.lowest_z_m() - self.table_z_m, Contact::ToolTable);
@@ -219,8 +198,8 @@ impl Scene {
             see(sphere_m.z - self.table_z_m - self.solids.sphere_radius_m, Contact::ToolTable);
             see(self.chuck_plate.distance_to_point(&sphere_m) - self.solids.sphere_radius_m, Contact::ToolTable);
         }
-        for (body, segment) in self.bodies.iter().zip(segments).take(self.tool_bodies) {
-            see(plate.distance_to_segment(segment) - body.radius_m, Contact::ToolLink(body.link + 1));
+        for &body in &self.tool_bodies {
+            see(self.tool_gap_m(segments, &plate, body), Contact::ToolLink(self.bodies[body].link + 1));
         }
     }
 
