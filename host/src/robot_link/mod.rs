@@ -3,7 +3,17 @@
 //! A [`RobotLink`] is told a joint vector and asked how the move stands; it never waits, so that the board is heard while the robot
 //! moves. What the controller says of a move and what the board's encoders say are two things: the caller compares them.
 
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`urscript`] | Universal Robots: URScript to move, RTDE to listen, the dashboard to recover |
+
+mod dashboard;
+mod patience;
+mod rtde;
 mod speed;
+mod tcp;
+pub mod urscript;
 
 use std::time::Duration;
 
@@ -11,6 +21,7 @@ use ballbar::JointVector;
 use miette::Diagnostic;
 use thiserror::Error;
 
+pub use patience::Patience;
 pub use speed::JointSpeed;
 
 /// How a move stands, by the controller.
