@@ -2,6 +2,9 @@
 
 #[path = "robot_links/ur.rs"]
 mod ur;
+#[cfg(unix)]
+#[path = "robot_links/val.rs"]
+mod val;
 
 use std::time::{Duration, Instant};
 

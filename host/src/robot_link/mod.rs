@@ -7,6 +7,7 @@
 //! | module | holds |
 //! | --- | --- |
 //! | [`urscript`] | Universal Robots: URScript to move, RTDE to listen, the dashboard to recover |
+//! | [`val`] | Unimation PUMAs with VAL or VAL II: what an operator types at its terminal |
 
 mod dashboard;
 mod patience;
@@ -14,6 +15,8 @@ mod rtde;
 mod speed;
 mod tcp;
 pub mod urscript;
+pub mod val;
+mod val_monitor;
 
 use std::time::Duration;
 

@@ -5,6 +5,8 @@ pub mod ur;
 mod ur_dashboard;
 mod ur_rtde;
 mod ur_script;
+#[cfg(unix)]
+pub mod val;
 
 pub use arm::{Arm, JOINTS, JointsAt};
 
