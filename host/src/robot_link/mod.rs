@@ -8,9 +8,11 @@
 //! | --- | --- |
 //! | [`urscript`] | Universal Robots: URScript to move, RTDE to listen, the dashboard to recover |
 //! | [`val`] | Unimation PUMAs with VAL or VAL II: what an operator types at its terminal |
+//! | [`program`] | files for controllers that take no moves on line |
 
 mod dashboard;
 mod patience;
+pub mod program;
 mod rtde;
 mod speed;
 mod tcp;

@@ -65,9 +65,9 @@ impl RobotState {
     /// Why the robot cannot move now, in the controller's words; `None` when it can.
     pub(super) fn obstacle(&self) -> Option<String> {
         if ![Self::NORMAL, Self::REDUCED].contains(&self.safety_mode) {
-            return Some(format!("safety mode {}", name(self.safety_mode, &SAFETY_MODES)));
+            return Some(format!("safety mode {}", name(self.safety_mode, 0, &SAFETY_MODES)));
         }
-        (self.robot_mode != Self::RUNNING).then(|| format!("robot mode {}", name(self.robot_mode + 1, &ROBOT_MODES)))
+        (self.robot_mode != Self::RUNNING).then(|| format!("robot mode {}", name(self.robot_mode, -1, &ROBOT_MODES)))
     }
 
     pub(super) fn is_in_protective_stop(&self) -> bool {
@@ -121,9 +121,11 @@ const ROBOT_MODES: [&str; 10] = [
     "UPDATING_FIRMWARE",
 ];
 
-fn name(index: i32, names: &[&str]) -> String {
-    let known = usize::try_from(index).ok().and_then(|index| names.get(index)).filter(|name| !name.is_empty());
-    known.map_or_else(|| format!("number {index}"), |name| (*name).to_owned())
+/// The name of a number, where the names begin at `first`.
+fn name(number: i32, first: i32, names: &[&str]) -> String {
+    let index = number.checked_sub(first).and_then(|index| usize::try_from(index).ok());
+    let known = index.and_then(|index| names.get(index)).filter(|name| !name.is_empty());
+    known.map_or_else(|| format!("number {number}"), |name| (*name).to_owned())
 }
 
 impl Rtde {
@@ -243,4 +245,54 @@ fn text(payload: &[u8]) -> Option<String> {
 /// Bytes as people may read them: no control characters.
 fn readable(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).chars().filter(|character| !character.is_control()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    fn payload(value: f64) -> Vec<u8> {
+        let words = [7_u32, 1, 2];
+        let vectors = (0..3 * JOINTS).flat_map(|_| value.to_be_bytes());
+        [5].into_iter().chain(vectors).chain(words.into_iter().flat_map(u32::to_be_bytes)).collect()
+    }
+
+    #[test]
+    fn a_data_package_is_of_its_recipe_and_size_and_holds_numbers() {
+        let robot = state(&payload(0.25), 5).unwrap();
+        assert_eq!((robot.q_rad, robot.target_q_rad), ([0.25; JOINTS], [0.25; JOINTS]));
+        assert!(robot.obstacle().is_none() && robot.is_playing());
+        assert_eq!(state(&payload(0.25), 6), None);
+        assert_eq!(state(&payload(f64::NAN), 5), None);
+        assert_eq!(state(&payload(0.25)[1..], 5), None);
+        assert_eq!(state(&[payload(0.25), vec![0]].concat(), 5), None);
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..20_000 {
+            let bytes: Vec<u8> = (0..rng.random_range(0..200)).map(|_| rng.random()).collect();
+            let _ = (state(&bytes, 5), text(&bytes));
+        }
+        assert_eq!(text(&[3, b'a', b'b']), None);
+        assert_eq!(text(&[2, b'a', 7, 0]), Some("a".into()));
+    }
+
+    #[test]
+    fn every_mode_has_a_name() {
+        let with = |robot_mode, safety_mode| {
+            let mut robot = state(&payload(0.0), 5).unwrap();
+            (robot.robot_mode, robot.safety_mode) = (robot_mode, safety_mode);
+            robot.obstacle()
+        };
+        assert_eq!(with(7, 2), None);
+        assert_eq!(with(3, 1).unwrap(), "robot mode POWER_OFF");
+        assert_eq!(with(7, 5).unwrap(), "safety mode SAFEGUARD_STOP");
+        assert_eq!(with(7, i32::MIN).unwrap(), "safety mode number -2147483648");
+        assert_eq!(with(i32::MAX, 1).unwrap(), "robot mode number 2147483647");
+    }
 }

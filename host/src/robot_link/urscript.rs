@@ -20,7 +20,7 @@ use super::tcp::Tcp;
 use super::{JointSpeed, LinkError, MoveState, Patience, RobotLink};
 
 /// Acceleration of moves, radians per second squared: `movej`'s default.
-const ACCELERATION_RAD_S2: f64 = 1.4;
+pub(super) const ACCELERATION_RAD_S2: f64 = 1.4;
 /// Deceleration of stops, radians per second squared: 60 degrees per second end within a quarter of a second.
 const STOP_RAD_S2: f64 = 4.0;
 /// The robot is where it was sent when no joint is off by more: far more than a UR's servos leave, far less than any planned step.

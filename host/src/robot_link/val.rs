@@ -24,6 +24,7 @@ use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
 
+use super::speed::percent;
 use super::val_monitor::{Heard, Monitor, is_complaint, where_deg};
 use super::{JointSpeed, LinkError, MoveState, Patience, RobotLink};
 
@@ -61,8 +62,7 @@ impl Default for ValSpeeds {
 impl ValSpeeds {
     /// Whole percent of VAL's `SPEED` at which no joint is faster than `revolute_rad_s`; 1 at least, 100 at most.
     pub fn percent(&self, revolute_rad_s: f64) -> u8 {
-        // Between 1 and 100.
-        (100.0 * revolute_rad_s / self.fastest_rad_s).clamp(1.0, 100.0) as u8
+        percent(revolute_rad_s, self.fastest_rad_s)
     }
 
     /// The longest that a way may take at a percentage, seconds.
