@@ -1,18 +1,19 @@
 //! Fanuc's teach pendant programs as ASCII (.LS), which a controller with the ASCII upload option loads.
 //!
-//! `J P[n] … FINE` is joint-interpolated with an exact stop; a speed in `sec` is the time of the move. The first move has no known way:
-//! it goes at 5 %. Positions are in joints, group 1, six axes and the extended ones E1 and E2, three decimals, which is what the
-//! controller writes itself.
+//! `J P[n] … FINE` is joint-interpolated with an exact stop; a speed in `sec` is the time of the move. The first move has no
+//! known way: it goes at 5 %. Positions are in joints, group 1, six axes and the extended ones E1 and E2, three decimals, which
+//! is what the controller writes itself.
 //!
-//! A six-axis arm's controller counts J3 from the horizontal, a chain from the second link: what is written is q3 - q2, by ROS-Industrial
-//! (ros-industrial/fanuc_experimental, issue 17: "J2-J3 linkage"; its drivers do the same for all such arms). Robots of fewer axes, and
-//! those with a slide among the first three, have no such linkage. The first remark of the program says so: jog to the first pose by hand.
+//! A six-axis arm's controller counts J3 from the horizontal, a chain from the second link: what is written is q3 - q2, by
+//! ROS-Industrial (ros-industrial/fanuc_experimental, issue 17: "J2-J3 linkage"; its drivers do the same for all such arms).
+//! Robots of fewer axes, and those with a slide among the first three, have no such linkage. The first remark of the program says
+//! so: jog to the first pose by hand.
 //!
 //! A program is split where it would exceed 999 positions: the first file then calls the others.
 //!
-//! Sources: Fanuc, "HandlingTool Setup and Operations Manual" (motion and wait instructions), from memory; the layout of the file and of
-//! positions in joints, millimetre axes among them, after .LS files of controllers in public repositories (GilbertPan97/HandEyeSync,
-//! JuniorNatalin/VASC); units of speed: aleksandarhaber.com, "Basics of Fanuc Motion Instructions".
+//! Sources: Fanuc, "HandlingTool Setup and Operations Manual" (motion and wait instructions), from memory; the layout of the file
+//! and of positions in joints, millimetre axes among them, after .LS files of controllers in public repositories
+//! (GilbertPan97/HandEyeSync, JuniorNatalin/VASC); units of speed: aleksandarhaber.com, "Basics of Fanuc Motion Instructions".
 
 use std::fmt::Write;
 use std::ops::Range;

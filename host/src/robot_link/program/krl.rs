@@ -1,11 +1,12 @@
 //! KUKA's KRL: a module of a program (.src) and its axis positions (.dat).
 //!
-//! `PTP` is joint-interpolated and, without `C_PTP`, stops exactly; `$ADVANCE=0` keeps the interpreter from running ahead. `E6AXIS` has
-//! A1 to A6 and the external axes E1 to E6, degrees where an axis turns and millimetres where it slides; components that are left out
-//! stay as they are. `$VEL_AXIS[]` is percent of an axis's full speed, which the controller knows and this program does not.
+//! `PTP` is joint-interpolated and, without `C_PTP`, stops exactly; `$ADVANCE=0` keeps the interpreter from running ahead.
+//! `E6AXIS` has A1 to A6 and the external axes E1 to E6, degrees where an axis turns and millimetres where it slides; components
+//! that are left out stay as they are. `$VEL_AXIS[]` is percent of an axis's full speed, which the controller knows and this
+//! program does not.
 //!
-//! Sources: KUKA, "KR C2/KR C3 Expert Programming" and "KSS 8.x Operating and Programming Instructions for System Integrators", from
-//! memory; `BAS(#INITMOV,0)`, `$VEL_AXIS[I]` and the head lines as in public post processors (visose/Robots).
+//! Sources: KUKA, "KR C2/KR C3 Expert Programming" and "KSS 8.x Operating and Programming Instructions for System Integrators",
+//! from memory; `BAS(#INITMOV,0)`, `$VEL_AXIS[I]` and the head lines as in public post processors (visose/Robots).
 
 use std::fmt::Write;
 

@@ -1,12 +1,13 @@
 //! ABB's RAPID: a module with the joint targets and a routine.
 //!
-//! `MoveAbsJ` is joint-interpolated, `fine` is an exact stop, `\NoEOffs` leaves offsets of external axes out, and `\T` gives the move its
-//! time in seconds instead of a speed of the tool, which would say nothing of the joints. The first move has no known way: it goes at
-//! `v50`. A joint target has six robot axes in degrees, and six external ones in degrees or millimetres, 9E9 where there are none.
+//! `MoveAbsJ` is joint-interpolated, `fine` is an exact stop, `\NoEOffs` leaves offsets of external axes out, and `\T` gives the
+//! move its time in seconds instead of a speed of the tool, which would say nothing of the joints. The first move has no known
+//! way: it goes at `v50`. A joint target has six robot axes in degrees, and six external ones in degrees or millimetres, 9E9
+//! where there are none.
 //!
-//! Source: ABB, "Technical reference manual - RAPID Instructions, Functions and Data types": `MoveAbsJ [\Conc] ToJointPos [\ID] [\NoEOffs]
-//! Speed [\V] | [\T] Zone [\Z] [\Inpos] Tool [\WObj]`, `jointtarget`, `WaitTime`; "RAPID overview": names of 32 characters (16 before
-//! RobotWare 5), comments after `!`.
+//! Source: ABB, "Technical reference manual - RAPID Instructions, Functions and Data types": `MoveAbsJ [\Conc] ToJointPos [\ID]
+//! [\NoEOffs] Speed [\V] | [\T] Zone [\Z] [\Inpos] Tool [\WObj]`, `jointtarget`, `WaitTime`; "RAPID overview": names of 32
+//! characters (16 before RobotWare 5), comments after `!`.
 
 use std::fmt::Write;
 
