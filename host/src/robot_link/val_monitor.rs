@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_message_is_a_complaint_and_a_prompt_is_none() {
-        for line in ["*Envelope error* Jt 2", "?", "Arm power off", "*Out of range*"] {
+        for line in ["*Envelope error* Jt 2", "*COMP mode disabled*", "?", "Arm power off", "*Out of range*"] {
             assert!(is_complaint(line), "{line}");
         }
         for line in ["*", ".", "X/JT1 Y/JT2", "1.00 2.00", "PROGRAM COMPLETED"] {
