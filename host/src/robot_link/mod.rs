@@ -2,7 +2,6 @@
 //!
 //! A [`RobotLink`] is told a joint vector and asked how the move stands; it never waits, so that the board is heard while the robot
 //! moves. What the controller says of a move and what the board's encoders say are two things: the caller compares them.
-
 //!
 //! | module | holds |
 //! | --- | --- |

@@ -7,7 +7,7 @@
 //! Joint angles are the controller's, radians, base to wrist 3: robot.toml must have the same zeros and senses, as the built-in
 //! `ur5e` has.
 //!
-//! Source: Universal Robots, "The URScript Programming Language" (`movej`, `stopj`), and the sources of the RTDE and dashboard
+//! Source: Universal Robots, "The URScript Programming Language" (`movej`, `stopj`; from memory), and the sources of the RTDE and dashboard
 //! modules beside this one.
 
 use std::time::{Duration, Instant};

@@ -4,8 +4,9 @@
 //! question `CHANGE?`. Whatever comes before the echo came by itself. The prompt `*` is also how messages begin (`*Envelope error*`):
 //! it counts only when nothing has followed for a moment.
 //!
-//! Sources: Unimation, "User's Guide to VAL" (398H2A, version 12, 1980), and V. Scheinman's drafts of it (saildart.org, UNI2.X); what
-//! messages look like is known from VAL II's successor: Adept, "V+ Language Reference Guide", system messages.
+//! Sources: Unimation, "User's Guide to VAL" (398H2A, version 12, 1980), of which only parts were at hand, and V. Scheinman's drafts
+//! of it (saildart.org, UNI2.X). The dialogue of `POINT` and the layout of `WHERE` are from memory, and what messages look like is
+//! taken from VAL II's successor: Adept, "V+ Language Reference Guide", system messages.
 
 use std::time::{Duration, Instant};
 

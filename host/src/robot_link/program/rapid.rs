@@ -5,9 +5,9 @@
 //! way: it goes at `v50`. A joint target has six robot axes in degrees, and six external ones in degrees or millimetres, 9E9
 //! where there are none.
 //!
-//! Source: ABB, "Technical reference manual - RAPID Instructions, Functions and Data types": `MoveAbsJ [\Conc] ToJointPos [\ID]
-//! [\NoEOffs] Speed [\V] | [\T] Zone [\Z] [\Inpos] Tool [\WObj]`, `jointtarget`, `WaitTime`; "RAPID overview": names of 32
-//! characters (16 before RobotWare 5), comments after `!`.
+//! Source: ABB, "Technical reference manual - RAPID Instructions, Functions and Data types", as others quote it: `MoveAbsJ [\Conc]
+//! ToJointPos [\ID] [\NoEOffs] Speed [\V] | [\T] Zone [\Z] [\Inpos] Tool [\WObj]`; `jointtarget` as in public modules
+//! (dkaynarc/tmc). `WaitTime\InPos`, names of 32 characters (16 before RobotWare 5) and comments after `!` are from memory.
 
 use std::fmt::Write;
 

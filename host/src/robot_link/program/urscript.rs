@@ -2,7 +2,7 @@
 //!
 //! `movej` with joint angles is joint-interpolated, `v` is the leading joint's speed, and without `r` it stops at its end.
 //!
-//! Source: Universal Robots, "The URScript Programming Language".
+//! Source: Universal Robots, "The URScript Programming Language", from memory.
 
 use std::fmt::Write;
 

@@ -3,8 +3,8 @@
 //! `MOVE` is joint-interpolated, `BREAK` waits for its end, `FINE` for the servos to be within their narrow tolerance, `DELAY` stands.
 //! A precision point is `#` and a name, six joint angles in degrees. Speeds are percent; the full speed is assumed as the link does.
 //!
-//! Sources: Unimation, "User's Guide to VAL" (398H2A); the layout of the file as VAL II's successor writes it, Adept, "V+ Language
-//! User's Guide", format of programs (`.PROGRAM name()`, `.END`, `;` for comments). `.LOCATIONS` is from memory of the same.
+//! Sources: the layout of a program as VAL II's successor writes it, Adept, "V+ Language User's Guide", format of programs
+//! (`.PROGRAM name()`, `.END`, `;` for comments). The instructions and `.LOCATIONS` are from memory of VAL II and V+.
 
 use std::fmt::Write;
 
