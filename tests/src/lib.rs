@@ -12,6 +12,7 @@ pub mod fake_board;
 pub mod fake_hardware;
 pub mod naive;
 pub mod parameter_sets;
+pub mod peers;
 pub mod power_cut;
 pub mod raw_payload;
 #[cfg(unix)]

@@ -141,7 +141,7 @@ impl RobotLink for Flawed {
             Flaw::Strays => {
                 let mut astray = *q;
                 astray.as_array_mut()[0] += 0.3;
-                self.link.start_move(&astray, speed)
+                self.link.start_move(&astray, &JointSpeed { revolute_rad_s: speed.revolute_rad_s / 300.0, ..*speed })
             }
             Flaw::IsGone => Err(LinkError::Lost { address: "here".into(), reason: "unplugged".into() }),
         }
@@ -398,8 +398,6 @@ fn poses_can_be_erased_skipped_and_waited_with() {
 fn a_robot_that_is_driven_by_hand_is_followed() {
     let (mut drive, driven) = driver();
     let cell = SimulatedCell::driven_by_hand(plant(3), driven, &SHORT_PLAN);
-    let rows = cell.rows();
-
     /// Attaches the bar where it is asked for, drives to what it is told, and a little beside it.
     struct Pendant<'a> {
         driver: &'a mut host_cal::virtual_board::Driver,
@@ -410,6 +408,7 @@ fn a_robot_that_is_driven_by_hand_is_followed() {
             let rig = ballbar_tests::simulated_cell::rig();
             match event {
                 Event::Attach(bar) => {
+                    self.wait();
                     let (chuck, sphere) = (rig.chuck(&bar.chuck).unwrap(), rig.sphere(&bar.sphere).unwrap());
                     let pairing = rig.pairing(host_cal::files::PairingId { chuck, sphere });
                     let bar = host_cal::virtual_board::AttachedBar { pairing, mid_m: bar.bar_m };
@@ -434,19 +433,17 @@ fn a_robot_that_is_driven_by_hand_is_followed() {
     impl Pendant<'_> {
         fn give(&mut self, order: Order) {
             self.driver.give(order);
+            self.wait();
+            self.is_done = true;
+        }
+
+        fn wait(&self) {
             while self.driver.stance().is_moving {
                 std::thread::sleep(Duration::from_millis(1));
             }
-            self.is_done = true;
         }
     }
 
-    // A hand brings the arm to the first pose, where the bar is attached.
-    let speed = JointSpeed { revolute_rad_s: 2.0, ..JointSpeed::default() };
-    drive.give(Order::Move { q: rows[0].q, speed, dwell_s: 0.1, length_error_m: 0.0 });
-    while drive.stance().is_moving {
-        std::thread::sleep(Duration::from_millis(1));
-    }
     let mut pendant = Pendant { driver: &mut drive, is_done: false };
     let collected = cell.collect_with("session", None, &mut pendant, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);

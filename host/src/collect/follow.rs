@@ -14,15 +14,18 @@ impl Collector<'_, '_> {
             let shell = self.ledger.shell_of(row);
             let joined = joined(&self.ledger.rows()[row]);
             load(joined);
+            if self.detach()? {
+                return Ok(Ended::Quit);
+            }
+            self.tell_where(row)?;
             if self.attach(joined)? {
                 return Ok(Ended::Quit);
             }
-            let mut told = None;
+            let mut told = row;
             while let Some(target) = shell.clone().find(|&row| *self.ledger.state(row) == RowState::Todo) {
-                if told != Some(target) {
-                    told = Some(target);
-                    let planned = &self.ledger.rows()[target];
-                    self.operator.tell(&Event::Drive { line: planned.line, q: &planned.q })?;
+                if told != target {
+                    told = target;
+                    self.tell_where(target)?;
                 }
                 if self.obey(Some(target))? {
                     return Ok(Ended::Quit);
@@ -34,6 +37,11 @@ impl Collector<'_, '_> {
             }
         }
         Ok(Ended::Done)
+    }
+
+    fn tell_where(&mut self, row: usize) -> Result<(), CollectError> {
+        let planned = &self.ledger.rows()[row];
+        Ok(self.operator.tell(&Event::Drive { line: planned.line, q: &planned.q })?)
     }
 
     /// Keeps a pose for the row of a shell that is nearest to it, if one is near.

@@ -2,9 +2,26 @@
 //!
 //! A [`RobotLink`] is told a joint vector and asked how the move stands; it never waits, so that the board is heard while the robot
 //! moves. What the controller says of a move and what the board's encoders say are two things: the caller compares them.
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`urscript`] | Universal Robots: URScript to move, RTDE to listen, the dashboard to recover |
+//! | [`val`] | Unimation PUMAs with VAL or VAL II: what an operator types at its terminal |
+//! | [`program`] | files for controllers that take no moves on line |
 
+<<<<<<< HEAD
 pub mod sim;
+=======
+mod dashboard;
+mod patience;
+pub mod program;
+mod rtde;
+>>>>>>> links
 mod speed;
+mod tcp;
+pub mod urscript;
+pub mod val;
+mod val_monitor;
 
 use std::time::Duration;
 
@@ -12,6 +29,7 @@ use ballbar::JointVector;
 use miette::Diagnostic;
 use thiserror::Error;
 
+pub use patience::Patience;
 pub use speed::JointSpeed;
 
 /// How a move stands, by the controller.

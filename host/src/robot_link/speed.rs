@@ -31,3 +31,9 @@ impl JointSpeed {
         kinds.iter().zip(from.as_array()).zip(to.as_array()).map(alone_s).fold(0.0, f64::max)
     }
 }
+
+/// Whole percent of a full speed that is not more than `speed`; 1 at least, 100 at most.
+pub(super) fn percent(speed: f64, full_speed: f64) -> u8 {
+    // What degrees lose on their way through radians does not cost a percent. Between 1 and 100.
+    (100.0 * speed / full_speed + 1e-9).clamp(1.0, 100.0) as u8
+}
