@@ -9,14 +9,11 @@
 //! | [`val`] | Unimation PUMAs with VAL or VAL II: what an operator types at its terminal |
 //! | [`program`] | files for controllers that take no moves on line |
 
-<<<<<<< HEAD
-pub mod sim;
-=======
 mod dashboard;
 mod patience;
 pub mod program;
 mod rtde;
->>>>>>> links
+pub mod sim;
 mod speed;
 mod tcp;
 pub mod urscript;
