@@ -218,7 +218,7 @@ pub fn quick() -> CollectOptions {
 
 /// Values of a column of a session's poses, by name.
 pub fn column(session: &Path, name: &str) -> Vec<String> {
-    let text = std::fs::read_to_string(session.join("poses.csv")).unwrap_or_default();
+    let Ok(text) = std::fs::read_to_string(session.join("poses.csv")) else { return Vec::new() };
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
     let at = header.iter().position(|column| *column == name).expect("the column is there");

@@ -9,7 +9,7 @@ use ballbar::JointVector;
 use ballbar_tests::command::host_cal_command;
 use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, column, plant, quick};
 use host_cal::collect::{CollectError, Ended, Event, Operator, RowState, Wish};
-use host_cal::robot_link::sim::{SimHand, SimLink, SimRequest};
+use host_cal::robot_link::sim::{SimClient, SimHand, SimLink, SimRequest};
 use host_cal::robot_link::{JointSpeed, LinkError, MoveState, RobotLink};
 use host_cal::session::Connection;
 use host_cal::virtual_board::{Order, driver};
@@ -86,7 +86,7 @@ impl Operator for Crew {
 /// A controller that does as it should but at one move, counted from the first.
 struct Flawed {
     link: SimLink,
-    hand: SimHand,
+    client: SimClient,
     flaw: Flaw,
     at: usize,
     /// How many moves from there on it is flawed at.
@@ -113,7 +113,8 @@ enum Flaw {
 
 impl Flawed {
     fn new(cell: &SimulatedCell, flaw: Flaw, at: usize, times: usize) -> Self {
-        Self { link: cell.link(), hand: cell.hand(), flaw, at, times, moves: 0, began: Instant::now() }
+        let client = SimClient::connect(&cell.address).unwrap();
+        Self { link: cell.link(), client, flaw, at, times, moves: 0, began: Instant::now() }
     }
 
     fn is_flawed(&self) -> bool {
@@ -136,12 +137,12 @@ impl RobotLink for Flawed {
             Flaw::Lies | Flaw::Refuses => Ok(()),
             // Slow enough to be caught on the way; the pace is free, so that the wall's time says little.
             Flaw::Faults | Flaw::DropsBar => {
-                self.link.start_move(q, &JointSpeed { revolute_rad_s: speed.revolute_rad_s / 300.0, ..*speed })
+                self.link.start_move(q, &JointSpeed { revolute_rad_s: speed.revolute_rad_s / 3000.0, ..*speed })
             }
             Flaw::Strays => {
                 let mut astray = *q;
                 astray.as_array_mut()[0] += 0.3;
-                self.link.start_move(&astray, &JointSpeed { revolute_rad_s: speed.revolute_rad_s / 300.0, ..*speed })
+                self.link.start_move(&astray, &JointSpeed { revolute_rad_s: speed.revolute_rad_s / 3000.0, ..*speed })
             }
             Flaw::IsGone => Err(LinkError::Lost { address: "here".into(), reason: "unplugged".into() }),
         }
@@ -160,7 +161,7 @@ impl RobotLink for Flawed {
                 Ok(MoveState::Fault("*Envelope error*".into()))
             }
             Flaw::DropsBar if is_under_way => {
-                self.hand.act(&SimRequest::Detach)?;
+                self.client.act(&SimRequest::Detach)?;
                 self.link.poll()
             }
             _ => self.link.poll(),
@@ -357,6 +358,7 @@ fn a_bar_that_is_attached_elsewhere_is_noticed() {
     assert!(collected.summary.troubles[0].contains("A:1 with the 460 mm bar"), "{:?}", collected.summary.troubles);
     assert_all_measured(&cell, "session");
 
+    let cell = self::cell();
     let mut crew = Crew { wrong: 3, ..Crew::new(&cell) };
     let collected = cell.collect_with("other", Some(&mut cell.link()), &mut crew, quick());
     assert!(matches!(collected.ended, Err(CollectError::WrongConnection { .. })), "{:?}", collected.ended);
@@ -369,8 +371,9 @@ fn a_bar_that_is_still_on_keeps_the_robot_where_it_is() {
     let mut crew = Crew { left_on: 1, ..Crew::new(&cell) };
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
-    assert!(collected.summary.troubles.iter().any(|words| words.contains("is the bar off?")));
+    assert!(collected.summary.troubles.iter().any(|words| words.contains("is the bar off?")), "{:?}", crew.told);
 
+    let cell = self::cell();
     let mut crew = Crew { left_on: 3, ..Crew::new(&cell) };
     let collected = cell.collect_with("other", Some(&mut cell.link()), &mut crew, quick());
     assert!(matches!(collected.ended, Err(CollectError::StillOn { .. })), "{:?}", collected.ended);

@@ -15,8 +15,8 @@ use crate::units::{mm_from_m, tidy};
 const PATIENCE: Duration = Duration::from_secs(3);
 /// The operator is asked so often for the same connection.
 const ATTEMPTS: usize = 3;
-/// A bar that hangs free does not keep its length so well.
-const STILL_ON_M: f64 = 5e-5;
+/// A bar that hangs free does not keep its length so well; one that is on rings no further.
+const STILL_ON_M: f64 = 5e-4;
 /// The bar is still moved by the hand that attached it for so long, by the board's clock.
 const STEADY_US: u64 = 200_000;
 

@@ -21,7 +21,7 @@ use crate::units::{ScreenUnit, joints_text};
 pub(super) struct Drive<'c, 'a, 'o, 'r> {
     pub(super) collector: &'c mut Collector<'a, 'o>,
     robot: &'r mut dyn RobotLink,
-    /// Rows at which the bar came off.
+    /// How often the bar came off on the way to this row.
     bar_off: usize,
 }
 
@@ -50,8 +50,8 @@ const AGREEMENT: Duration = Duration::from_secs(2);
 const POLL: Duration = Duration::from_millis(1);
 /// So long without a bar within its travel is no jolt, by the board's clock.
 const OFF_US: u64 = 100_000;
-/// Times that the bar is attached again on one run before somebody has to look.
-const BAR_OFF_TIMES: usize = 3;
+/// Times that the bar is attached again on the way to one row before somebody has to look.
+const BAR_OFF_TIMES: usize = 2;
 /// Seed of ways that have to be searched for.
 const SEED: u64 = 0;
 
@@ -132,7 +132,10 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
             }
             let q = self.collector.ledger.rows()[next].q;
             match self.go_measuring(&q, next)? {
-                Go::Arrived => return Ok(Step::Arrived),
+                Go::Arrived => {
+                    self.bar_off = 0;
+                    return Ok(Step::Arrived);
+                }
                 Go::Refused(why) => return Ok(Step::Blocked(why)),
                 Go::Failed(why) => words = why,
                 Go::BarOff => {
