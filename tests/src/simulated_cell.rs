@@ -7,7 +7,7 @@ use std::time::Duration;
 use ballbar::StillnessCriteria;
 use host_cal::board::{BAUD, BoardLink, RobotOnBoard, parameter_set};
 use host_cal::collect::{
-    BoardWatch, CollectError, CollectOptions, Collector, Ended, Ledger, Nearness, Operator, RowState, Summary,
+    BoardWatch, CollectError, CollectOptions, Collector, Ended, Guide, Ledger, Nearness, Operator, RowState, Summary,
 };
 use host_cal::files::{PairingId, PlanRow, Rig, Robot, Source, read_plan, write_plan};
 use host_cal::plan::{Cell, Grid, Margins, Pace as PlanPace, PlanOptions, plan};
@@ -170,7 +170,7 @@ impl SimulatedCell {
         let near = Nearness { turn_rad: 2_f64.to_radians(), slide_m: 2e-3 };
         let ended = match link {
             Some(link) => collector.drive(link),
-            None => collector.follow(near, &mut |_| {}),
+            None => collector.follow(near, &Guide::Hand),
         };
         let (summary, ledger) = collector.end().expect("the session can be written");
         let states = (0..rows.len()).map(|row| ledger.state(row).clone()).collect();

@@ -275,6 +275,18 @@ fn a_controller_that_claims_to_be_there_is_not_believed() {
 }
 
 #[test]
+fn nothing_moves_while_controller_and_encoders_disagree() {
+    let cell = cell();
+    let run = cell.host_cal(&["home", "port", "--q", "0,-90,90,0,0,0"]);
+    assert_eq!(run.code, 0, "{}", run.transcript());
+    let mut link = cell.link();
+    let before = link.joints().unwrap();
+    let collected = cell.collect_with("session", Some(&mut link), &mut Crew::new(&cell), quick());
+    assert!(matches!(collected.ended, Err(CollectError::Disagree { joint: 2, .. })), "{:?}", collected.ended);
+    assert_eq!(link.joints().unwrap(), before);
+}
+
+#[test]
 fn a_robot_that_strays_is_stopped() {
     let cell = cell();
     let mut crew = Crew::new(&cell);

@@ -1,29 +1,34 @@
 //! `host-cal collect`: walk a plan and keep the poses.
 
+mod mover;
 mod operator;
+mod programs;
 mod report;
 mod session_files;
 
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
+use super::live_line::LiveLine;
 use super::outcome::{CommandError, Outcome};
 use super::port::{EndRequest, PortArgs, StillnessArgs};
-use super::report::{print, warn};
+use super::report::print;
 use super::stream::record_error;
 use crate::board::{BoardLink, RobotOnBoard};
-use crate::collect::{BoardWatch, CollectError, CollectOptions, Collector, Ledger, Nearness, TrackOptions, remove_lag};
+use crate::collect::{BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, remove_lag};
 use crate::plan::{Cell, Margins, Pace};
-use crate::robot_link::sim::{SimHand, SimLink};
-use crate::robot_link::{JointSpeed, RobotLink};
+use crate::robot_link::JointSpeed;
+use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run};
 use crate::units::m_from_mm;
+use mover::{Mover, MoverArgs};
 use operator::{Hand, KEYS, Terminal};
+use programs::write_programs;
 use report::CollectReport;
 use session_files::SessionFiles;
 
@@ -51,12 +56,8 @@ pub(super) struct CollectArgs {
     /// rig.toml, or the built-in: triangles
     #[arg(long)]
     rig: Option<String>,
-    /// How the robot is moved
-    #[arg(long, value_enum)]
-    robot_link: LinkKind,
-    /// Where the robot's controller is: a network address or a serial port
-    #[arg(long, value_name = "ADDRESS")]
-    robot_address: Option<String>,
+    #[command(flatten)]
+    mover: MoverArgs,
     /// Speed of revolute joints
     #[arg(long, value_name = "DEG/S", default_value_t = 30.0, allow_hyphen_values = true)]
     speed_deg_s: f64,
@@ -78,6 +79,9 @@ pub(super) struct CollectArgs {
     /// With manual and file: how near to a planned pose the arm has to stand, degrees and millimetres
     #[arg(long, value_name = "DEG", default_value_t = 2.0, allow_hyphen_values = true)]
     near_deg: f64,
+    /// With file: how long the robot stands at a measured pose, seconds
+    #[arg(long, value_name = "S", default_value_t = 3.0, allow_hyphen_values = true)]
+    stand_s: f64,
     /// Samples a second, 100 to 5000
     #[arg(long, default_value_t = 500, value_name = "HZ", value_parser = clap::value_parser!(u16).range(100..=5_000))]
     rate: u16,
@@ -96,22 +100,21 @@ pub(super) struct CollectArgs {
     output: OutputArgs,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum LinkKind {
-    /// Somebody drives with the teach pendant, and the board sees where the robot is
-    Manual,
-    /// The simulated robot of `host-cal virtual-board --controller ADDRESS`
-    Sim,
-}
-
 #[derive(Debug, Error, Diagnostic)]
 enum ArgumentError {
-    #[error("--robot-link {0} needs --robot-address")]
-    #[diagnostic(help("{1}"))]
-    NoAddress(&'static str, &'static str),
+    #[error("--continuous needs a robot link that this program moves the robot by")]
+    #[diagnostic(help("With manual and file every pose is measured standing."))]
+    ContinuousByHand,
     #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
     #[diagnostic(help("Tell it the robot first: host-cal apply PORT --robot robot.toml --uncalibrated"))]
     NoParameters,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+#[error("{}: cannot be made: {error}", folder.display())]
+struct FolderError {
+    folder: PathBuf,
+    error: std::io::Error,
 }
 
 impl CollectArgs {
@@ -121,20 +124,24 @@ impl CollectArgs {
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
         let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default())?;
 
-        let mut mover = self.mover(files.robot.chain.joints())?;
+        let mut mover = self.mover.open(files.robot.chain.joint_kinds())?;
+        if self.continuous && !matches!(mover, Mover::Link(_)) {
+            return Err(ArgumentError::ContinuousByHand.into());
+        }
         let mut link = self.port.connect()?;
         let robot = RobotOnBoard::read(&mut link)?.ok_or(ArgumentError::NoParameters)?;
         files.write()?;
-        let recorder = self.recorder(&link, &robot, mover.as_deref())?;
+        let guide = self.guide(&mover, &files, &options)?;
+        let recorder = self.recorder(&link, &robot, &mover)?;
         let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
-        let board = BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria())?;
+        let board = BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
 
         let mut terminal = Terminal::new(self.hand()?, files.robot.chain.joint_kinds(), EndRequest::listen());
         let began = Instant::now();
         let mut collector = Collector::new(&cell, ledger, board, &mut terminal, options);
-        let ended = match mover.as_deref_mut() {
-            Some(mover) => collector.drive(mover),
-            None => collector.follow(self.nearness(), &mut |_| {}),
+        let ended = match &mut mover {
+            Mover::Link(link) => collector.drive(link.as_mut()),
+            Mover::Programs(_) | Mover::Hand => collector.follow(self.nearness(), &guide),
         };
         let (summary, ledger) = collector.end().map_err(collect_error)?;
         terminal.clear();
@@ -173,25 +180,19 @@ impl CollectArgs {
         })
     }
 
-    /// What moves the robot; `None` when somebody does it by hand.
-    fn mover(&self, joints: usize) -> Result<Option<Box<dyn RobotLink>>, CommandError> {
-        Ok(match self.robot_link {
-            LinkKind::Manual => None,
-            LinkKind::Sim => Some(Box::new(SimLink::connect(self.sim_address()?, joints)?)),
-        })
-    }
-
-    fn sim_address(&self) -> Result<&str, ArgumentError> {
-        const HELP: &str = "It is the second line that host-cal virtual-board --controller 127.0.0.1:0 prints.";
-        self.robot_address.as_deref().ok_or(ArgumentError::NoAddress("sim", HELP))
+    /// What somebody is told who moves the robot.
+    fn guide(&self, mover: &Mover, files: &SessionFiles, options: &CollectOptions) -> Result<Guide, CommandError> {
+        let Mover::Programs(dialect) = mover else { return Ok(Guide::Hand) };
+        let programs = write_programs(&self.session, files, *dialect, options.speed, self.stand_s)?;
+        Ok(Guide::Programs(programs))
     }
 
     fn hand(&self) -> Result<Hand, CommandError> {
-        Ok(match self.robot_link {
-            LinkKind::Sim => Hand::Sim(SimHand::connect(self.sim_address()?)?),
-            _ if self.yes => Hand::Nobody,
-            _ => {
-                warn(KEYS);
+        Ok(match self.mover.simulation()? {
+            Some(address) => Hand::Sim(SimHand::connect(address)?),
+            None if self.yes => Hand::Nobody,
+            None => {
+                LiveLine::new().note(KEYS);
                 Hand::Person
             }
         })
@@ -205,11 +206,11 @@ impl CollectArgs {
         &self,
         link: &BoardLink,
         (robot, frame): &(RobotOnBoard, Vec<u8>),
-        mover: Option<&dyn RobotLink>,
+        mover: &Mover,
     ) -> Result<Recorder, CommandError> {
         let run = Run {
             rig: self.rig.clone(),
-            robot_link: Some(mover.map_or("manual".into(), RobotLink::name)),
+            robot_link: Some(mover.name()),
             temperature_c: self.temperature_c,
             ..Run::beginning(link.port_name(), link.hello(), self.rate)
         };

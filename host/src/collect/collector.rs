@@ -7,6 +7,7 @@ use ballbar::JointVector;
 
 use super::board_watch::{BoardWatch, Stand};
 use super::errors::CollectError;
+use super::follow::Guide;
 use super::ledger::{Joined, Ledger, RowState};
 use super::operator::{Event, Measured, Operator, Wish};
 use super::repeat::Repeat;
@@ -121,13 +122,13 @@ impl<'a, 'o> Collector<'a, 'o> {
     }
 
     /// Measures all that is left, while somebody or something else moves the robot: every pose at which it stands still counts for
-    /// the row within `near` of it. `load` is called for each shell before it is begun.
+    /// the row within `near` of it.
     ///
     /// # Errors
     /// [`CollectError`] when it has to stop before.
-    pub fn follow(&mut self, near: Nearness, load: &mut dyn FnMut(Joined)) -> Result<Ended, CollectError> {
+    pub fn follow(&mut self, near: Nearness, guide: &Guide) -> Result<Ended, CollectError> {
         self.check_board()?;
-        self.follow_all(near, load)
+        self.follow_all(near, guide)
     }
 
     /// Ends the stream and the session. What came of the run, and the plan with what is done of it.

@@ -62,12 +62,25 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
 
     /// Measures all that is left; on an error the robot is stopped.
     pub(super) fn run(mut self) -> Result<Ended, CollectError> {
-        let ended = self.walk();
+        let ended = self.compare_controller().and_then(|()| self.walk());
         if ended.is_err() {
             // The error is what matters; a controller that is gone cannot be told.
             let _ = self.robot.stop();
         }
         ended
+    }
+
+    /// Before anything moves: the controller and the board have the robot at the same place.
+    fn compare_controller(&mut self) -> Result<(), CollectError> {
+        let Some(said) = self.robot.joints()? else { return Ok(()) };
+        let kinds = self.collector.cell.robot.chain.joint_kinds();
+        let found = self.collector.board.view()?.q;
+        let (share, joint) = self.collector.options.way.worst(kinds, &said, &found);
+        if share <= 1.0 {
+            return Ok(());
+        }
+        let at = |q: &JointVector<f64>| in_unit(kinds[joint], q.as_array()[joint]);
+        Err(CollectError::Disagree { joint: joint + 1, controller: at(&said), encoders: at(&found) })
     }
 
     fn walk(&mut self) -> Result<Ended, CollectError> {

@@ -62,6 +62,19 @@ pub enum CollectError {
         /// Its joint vector.
         target: String,
     },
+    /// The controller and the encoders do not have the robot at the same place.
+    #[error("the robot's controller has joint {joint} at {controller}, the board's encoders at {encoders}; nothing was moved")]
+    #[diagnostic(help(
+        "Is the board homed, has robot.toml the encoders' signs and the controller's zeros? See `host-cal pose` and docs/robots.md."
+    ))]
+    Disagree {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// By the controller.
+        controller: String,
+        /// By the encoders.
+        encoders: String,
+    },
     /// The controller says that the robot has arrived, and the encoders that it is elsewhere.
     #[error(
         "line {line} of the plan: the controller says the robot is there, but by the board's encoders joint {joint} is at {found}, sent to {sent}"

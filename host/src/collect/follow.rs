@@ -1,42 +1,83 @@
 //! Measuring while somebody drives the robot with the teach pendant, or a program runs at its controller: every pose at which the arm
 //! stands still counts for the row that it is near.
 
+use std::ops::Range;
+
 use super::Nearness;
 use super::board_watch::Stand;
 use super::collector::{Collector, Ended};
 use super::errors::CollectError;
-use super::ledger::{Joined, RowState, joined};
+use super::ledger::{RowState, joined, shells};
 use super::operator::Event;
 
+/// What somebody is told who moves the robot.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Guide {
+    /// Where to drive.
+    Hand,
+    /// Which programs to start, for each shell of the plan.
+    Programs(Vec<ShellPrograms>),
+}
+
+/// Programs of one shell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShellPrograms {
+    /// Brings the robot, without the bar, to where the bar is attached.
+    pub approach: String,
+    /// Goes over the shell.
+    pub measure: String,
+}
+
 impl Collector<'_, '_> {
-    pub(super) fn follow_all(&mut self, near: Nearness, load: &mut dyn FnMut(Joined)) -> Result<Ended, CollectError> {
-        while let Some(row) = self.ledger.first() {
-            let shell = self.ledger.shell_of(row);
-            let joined = joined(&self.ledger.rows()[row]);
-            load(joined);
+    pub(super) fn follow_all(&mut self, near: Nearness, guide: &Guide) -> Result<Ended, CollectError> {
+        let shells: Vec<Range<usize>> = shells(self.ledger.rows()).collect();
+        for (number, shell) in shells.into_iter().enumerate() {
+            let Some(first) = self.todo(&shell) else { continue };
+            let programs = match guide {
+                Guide::Hand => None,
+                Guide::Programs(programs) => programs.get(number),
+            };
             if self.detach()? {
                 return Ok(Ended::Quit);
             }
-            self.tell_where(row)?;
-            if self.attach(joined)? {
+            match programs {
+                None => self.tell_where(first)?,
+                Some(programs) => self.operator.tell(&Event::Start(&programs.approach))?,
+            }
+            if self.attach(joined(&self.ledger.rows()[first]))? {
                 return Ok(Ended::Quit);
             }
-            let mut told = row;
-            while let Some(target) = shell.clone().find(|&row| *self.ledger.state(row) == RowState::Todo) {
-                if told != target {
-                    told = target;
-                    self.tell_where(target)?;
-                }
-                if self.obey(Some(target))? {
-                    return Ok(Ended::Quit);
-                }
-                self.listen()?;
-                if let Some(stand) = self.board.take_stand() {
-                    self.take_followed(shell.clone(), near, stand)?;
-                }
+            if let Some(programs) = programs {
+                self.operator.tell(&Event::Start(&programs.measure))?;
+            }
+            if self.follow_shell(&shell, near, programs.is_none())? {
+                return Ok(Ended::Quit);
             }
         }
         Ok(Ended::Done)
+    }
+
+    /// Until nothing of a shell is left. True when the operator wants to end.
+    fn follow_shell(&mut self, shell: &Range<usize>, near: Nearness, by_hand: bool) -> Result<bool, CollectError> {
+        let mut told = self.todo(shell);
+        while let Some(target) = self.todo(shell) {
+            if by_hand && told != Some(target) {
+                told = Some(target);
+                self.tell_where(target)?;
+            }
+            if self.obey(Some(target))? {
+                return Ok(true);
+            }
+            self.listen()?;
+            if let Some(stand) = self.board.take_stand() {
+                self.take_followed(shell, near, stand)?;
+            }
+        }
+        Ok(false)
+    }
+
+    fn todo(&self, shell: &Range<usize>) -> Option<usize> {
+        shell.clone().find(|&row| *self.ledger.state(row) == RowState::Todo)
     }
 
     fn tell_where(&mut self, row: usize) -> Result<(), CollectError> {
@@ -45,15 +86,18 @@ impl Collector<'_, '_> {
     }
 
     /// Keeps a pose for the row of a shell that is nearest to it, if one is near.
-    fn take_followed(&mut self, shell: std::ops::Range<usize>, near: Nearness, stand: Stand) -> Result<(), CollectError> {
+    fn take_followed(&mut self, shell: &Range<usize>, near: Nearness, stand: Stand) -> Result<(), CollectError> {
         let kinds = self.cell.robot.chain.joint_kinds();
         let off = |&row: &usize| near.worst(kinds, &self.ledger.rows()[row].q, &stand.q).0;
-        let todo = shell.filter(|&row| *self.ledger.state(row) == RowState::Todo);
-        let Some(row) = todo.min_by(|a, b| off(a).total_cmp(&off(b))) else { return Ok(()) };
+        let is_planned = |&row: &usize| *self.ledger.state(row) != RowState::Via;
+        let Some(row) = shell.clone().filter(is_planned).min_by(|a, b| off(a).total_cmp(&off(b))) else { return Ok(()) };
         if off(&row) > 1.0 {
             let line = self.ledger.rows()[row].line;
             let words = format!("the arm stands at no planned pose; the nearest is line {line}, {:.1} times too far", off(&row));
             return Ok(self.operator.tell(&Event::Trouble(&words))?);
+        }
+        if *self.ledger.state(row) != RowState::Todo {
+            return Ok(());
         }
         self.keep(row, Some(stand))
     }

@@ -114,6 +114,16 @@ impl<'a> Ledger<'a> {
     }
 }
 
+/// Rows of a plan by connection, in order.
+pub fn shells(rows: &[PlanRow]) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
+    let mut start = 0;
+    rows.chunk_by(|a, b| joined(a) == joined(b)).map(move |shell| {
+        let shell = start..start + shell.len();
+        start = shell.end;
+        shell
+    })
+}
+
 /// What the bar joins, or will join, at a row.
 pub(super) fn joined(row: &PlanRow) -> Joined {
     (row.pairing, row.bar_m)

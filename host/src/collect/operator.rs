@@ -57,6 +57,8 @@ pub enum Event<'a> {
         /// Encoder outputs.
         q: &'a ballbar::JointVector<f64>,
     },
+    /// Start this program at the controller.
+    Start(&'a str),
     /// A pose was measured.
     Measured(&'a Measured),
     /// A row was not measured.

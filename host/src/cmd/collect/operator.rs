@@ -99,6 +99,7 @@ impl Operator for Terminal {
             Event::Drive { line, q } => {
                 self.line.note(&format!("line {line}: drive to {}", joints_text(&self.kinds, q.as_array())));
             }
+            Event::Start(program) => self.line.note(&format!("start the program {program} at the robot's controller")),
             Event::Measured(pose) => {
                 let [inwards, outwards] = pose.travel_left_m.map(|m| fixed(mm_from_m(m), 1));
                 self.line.note(&format!(

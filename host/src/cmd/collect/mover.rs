@@ -1,0 +1,158 @@
+//! What moves the robot: a controller on line, a program of its own, or somebody's hand.
+
+use ballbar::JointKind;
+use clap::{Args, ValueEnum};
+use miette::Diagnostic;
+use thiserror::Error;
+
+use crate::cmd::outcome::CommandError;
+use crate::robot_link::program::Dialect;
+use crate::robot_link::sim::SimLink;
+use crate::robot_link::urscript::{UrLink, UrPorts};
+use crate::robot_link::val::{VAL_BAUD, ValLink, ValSpeeds};
+use crate::robot_link::{Patience, RobotLink};
+
+/// Which robot link, and where.
+#[derive(Args)]
+pub(super) struct MoverArgs {
+    /// How the robot is moved (docs/robots.md)
+    #[arg(long, value_enum)]
+    robot_link: LinkKind,
+    /// Where the robot's controller is: a network address, or the serial port of a VAL controller
+    #[arg(long, value_name = "ADDRESS")]
+    robot_address: Option<String>,
+    /// With val: bits a second of the controller's line
+    #[arg(long, default_value_t = VAL_BAUD, value_name = "BAUD")]
+    robot_baud: u32,
+    /// With urscript: ports of the secondary interface, of RTDE and of the dashboard
+    #[arg(long, value_name = "PORT,PORT,PORT", default_value = "30002,30004,29999", value_parser = parse_ports)]
+    robot_ports: UrPorts,
+    /// With file: the controller's language
+    #[arg(long, value_enum)]
+    dialect: Option<DialectArg>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LinkKind {
+    /// Somebody drives with the teach pendant, and the board sees where the robot is
+    Manual,
+    /// The simulated robot of `host-cal virtual-board --controller ADDRESS`
+    Sim,
+    /// A Unimation controller with VAL, over the serial line of its terminal
+    Val,
+    /// A Universal Robots controller, over the network
+    Urscript,
+    /// Programs for a controller that takes no moves on line; the board sees where the robot is
+    File,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum DialectArg {
+    /// Unimation
+    Val,
+    /// Universal Robots
+    Urscript,
+    /// KUKA
+    Krl,
+    /// ABB
+    Rapid,
+    /// Fanuc LS
+    Fanuc,
+}
+
+/// What moves the robot.
+pub(super) enum Mover {
+    /// A controller on line.
+    Link(Box<dyn RobotLink>),
+    /// Programs that somebody starts.
+    Programs(Dialect),
+    /// Somebody's hand.
+    Hand,
+}
+
+#[derive(Debug, Error, Diagnostic)]
+enum MoverError {
+    #[error("--robot-link {link} needs --robot-address")]
+    #[diagnostic(help("{help}"))]
+    NoAddress { link: &'static str, help: &'static str },
+    #[error("--robot-link file needs --dialect")]
+    #[diagnostic(help("One of val, urscript, krl, rapid, fanuc."))]
+    NoDialect,
+    #[error("--robot-link {link}: such a controller has six revolute joints, the robot has {found}")]
+    Joints { link: &'static str, found: String },
+}
+
+impl MoverArgs {
+    /// Connects to what moves the robot.
+    pub(super) fn open(&self, kinds: &[JointKind]) -> Result<Mover, CommandError> {
+        let link: Box<dyn RobotLink> = match self.robot_link {
+            LinkKind::Manual => return Ok(Mover::Hand),
+            LinkKind::File => return Ok(Mover::Programs(self.dialect.ok_or(MoverError::NoDialect)?.into())),
+            LinkKind::Sim => Box::new(SimLink::connect(self.sim_address()?, kinds.len())?),
+            LinkKind::Val => {
+                six_revolute("val", kinds)?;
+                let port =
+                    self.address("val", "It is the serial port that is connected in the place of the controller's terminal.")?;
+                Box::new(ValLink::open(port, self.robot_baud, ValSpeeds::default(), Patience::default())?)
+            }
+            LinkKind::Urscript => {
+                six_revolute("urscript", kinds)?;
+                let host = self.address("urscript", "It is the controller's network address.")?;
+                Box::new(UrLink::connect(host, self.robot_ports, Patience::default())?)
+            }
+        };
+        Ok(Mover::Link(link))
+    }
+
+    /// The simulation's address, when it is the simulation that moves.
+    pub(super) fn simulation(&self) -> Result<Option<&str>, CommandError> {
+        if self.robot_link == LinkKind::Sim { Ok(Some(self.sim_address()?)) } else { Ok(None) }
+    }
+
+    fn sim_address(&self) -> Result<&str, MoverError> {
+        self.address("sim", "It is the second line that host-cal virtual-board --controller 127.0.0.1:0 prints.")
+    }
+
+    fn address(&self, link: &'static str, help: &'static str) -> Result<&str, MoverError> {
+        self.robot_address.as_deref().ok_or(MoverError::NoAddress { link, help })
+    }
+}
+
+fn parse_ports(text: &str) -> Result<UrPorts, String> {
+    let ports: Result<Vec<u16>, _> = text.split(',').map(|port| port.trim().parse()).collect();
+    match ports.as_deref() {
+        Ok(&[script, rtde, dashboard]) => Ok(UrPorts { script, rtde, dashboard }),
+        _ => Err("expected three ports, as in 30002,30004,29999".into()),
+    }
+}
+
+fn six_revolute(link: &'static str, kinds: &[JointKind]) -> Result<(), MoverError> {
+    if kinds == [JointKind::Revolute; 6] {
+        return Ok(());
+    }
+    let prismatic = kinds.iter().filter(|kind| **kind == JointKind::Prismatic).count();
+    Err(MoverError::Joints { link, found: format!("{} revolute and {prismatic} prismatic ones", kinds.len() - prismatic) })
+}
+
+impl Mover {
+    /// For the session.
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::Link(link) => link.name(),
+            Self::Programs(dialect) => format!("file, {dialect}"),
+            Self::Hand => "manual".into(),
+        }
+    }
+}
+
+impl From<DialectArg> for Dialect {
+    fn from(dialect: DialectArg) -> Self {
+        match dialect {
+            DialectArg::Val => Self::Val,
+            DialectArg::Urscript => Self::UrScript,
+            DialectArg::Krl => Self::Krl,
+            DialectArg::Rapid => Self::Rapid,
+            DialectArg::Fanuc => Self::FanucLs,
+        }
+    }
+}
