@@ -172,7 +172,8 @@ impl SimulatedCell {
             Some(link) => collector.drive(link),
             None => collector.follow(near, &Guide::Hand),
         };
-        let (summary, ledger) = collector.end().expect("the session can be written");
+        let (summary, ledger, closed) = collector.end();
+        closed.expect("the session can be written");
         let states = (0..rows.len()).map(|row| ledger.state(row).clone()).collect();
         Collected { ended, summary, states, rows }
     }

@@ -282,7 +282,7 @@ fn nothing_moves_while_controller_and_encoders_disagree() {
     let mut link = cell.link();
     let before = link.joints().unwrap();
     let collected = cell.collect_with("session", Some(&mut link), &mut Crew::new(&cell), quick());
-    assert!(matches!(collected.ended, Err(CollectError::Disagree { joint: 2, .. })), "{:?}", collected.ended);
+    assert!(matches!(collected.ended, Err(CollectError::Disagree { .. })), "{:?}", collected.ended);
     assert_eq!(link.joints().unwrap(), before);
 }
 
@@ -380,13 +380,14 @@ fn a_bar_that_is_attached_elsewhere_is_noticed() {
 #[test]
 fn a_bar_that_is_still_on_keeps_the_robot_where_it_is() {
     let cell = cell();
-    let mut crew = Crew { left_on: 1, ..Crew::new(&cell) };
+    // The first time nobody knows whether it is on.
+    let mut crew = Crew { left_on: 2, ..Crew::new(&cell) };
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert!(collected.summary.troubles.iter().any(|words| words.contains("is the bar off?")), "{:?}", crew.told);
 
     let cell = self::cell();
-    let mut crew = Crew { left_on: 3, ..Crew::new(&cell) };
+    let mut crew = Crew { left_on: 4, ..Crew::new(&cell) };
     let collected = cell.collect_with("other", Some(&mut cell.link()), &mut crew, quick());
     assert!(matches!(collected.ended, Err(CollectError::StillOn { .. })), "{:?}", collected.ended);
 }

@@ -7,7 +7,7 @@ mod report;
 mod session_files;
 
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use miette::Diagnostic;
@@ -21,7 +21,8 @@ use super::report::print;
 use super::stream::record_error;
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, remove_lag};
-use crate::plan::{Cell, Margins, Pace};
+use crate::files::PlanRow;
+use crate::plan::{Cell, Margins, Pace, check};
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run};
@@ -74,11 +75,14 @@ pub(super) struct CollectArgs {
     #[arg(long, value_name = "MM/S", default_value_t = 20.0, allow_hyphen_values = true)]
     slow_mm_s: f64,
     /// With --continuous: time from one pose to the next, milliseconds
-    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u32).range(50..=60_000))]
+    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u32).range(100..=60_000))]
     every_ms: u32,
-    /// With manual and file: how near to a planned pose the arm has to stand, degrees and millimetres
+    /// With manual and file: how near to a planned pose the arm has to stand, revolute joints
     #[arg(long, value_name = "DEG", default_value_t = 2.0, allow_hyphen_values = true)]
     near_deg: f64,
+    /// The same, prismatic joints
+    #[arg(long, value_name = "MM", default_value_t = 2.0, allow_hyphen_values = true)]
+    near_mm: f64,
     /// With file: how long the robot stands at a measured pose, seconds
     #[arg(long, value_name = "S", default_value_t = 3.0, allow_hyphen_values = true)]
     stand_s: f64,
@@ -100,11 +104,17 @@ pub(super) struct CollectArgs {
     output: OutputArgs,
 }
 
+/// An arm that has arrived rings no longer than this.
+const COMING_TO_REST: Duration = Duration::from_secs(20);
+
 #[derive(Debug, Error, Diagnostic)]
 enum ArgumentError {
     #[error("--continuous needs a robot link that this program moves the robot by")]
     #[diagnostic(help("With manual and file every pose is measured standing."))]
     ContinuousByHand,
+    #[error("the plan has {what}")]
+    #[diagnostic(help("Nothing was moved. `host-cal plan --check` says more; plan again, or correct the rig's [solids]."))]
+    UnsafePlan { what: String },
     #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
     #[diagnostic(help("Tell it the robot first: host-cal apply PORT --robot robot.toml --uncalibrated"))]
     NoParameters,
@@ -117,12 +127,31 @@ struct FolderError {
     error: std::io::Error,
 }
 
+/// Nothing is moved along a plan that leads into something, whoever wrote or edited it.
+fn check_plan(cell: &Cell<'_>, rows: &[PlanRow]) -> Result<(), ArgumentError> {
+    /// Of a joint, radians or metres.
+    const STEP: f64 = 0.02;
+    let found = check(cell, rows, STEP, 0, 0);
+    let what = if found.limit_rad < 0.0 || found.limit_m < 0.0 {
+        "a joint beyond its limits".to_owned()
+    } else if found.travel_m < 0.0 {
+        "the bar beyond its travel".to_owned()
+    } else if found.clearance_m < 0.0 {
+        let line = rows.get(found.nearest_row).map_or(0, |row| row.line);
+        format!("{} in one another, on the way to line {line}", found.nearest)
+    } else {
+        return Ok(());
+    };
+    Err(ArgumentError::UnsafePlan { what })
+}
+
 impl CollectArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let options = self.options()?;
         let files = SessionFiles::open(&self.session, self.plan.as_deref(), self.robot.as_deref(), self.rig.as_deref())?;
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
         let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default())?;
+        check_plan(&cell, &files.rows)?;
 
         let mut mover = self.mover.open(files.robot.chain.joint_kinds())?;
         if self.continuous && !matches!(mover, Mover::Link(_)) {
@@ -143,14 +172,18 @@ impl CollectArgs {
             Mover::Link(link) => collector.drive(link.as_mut()),
             Mover::Programs(_) | Mover::Hand => collector.follow(self.nearness(), &guide),
         };
-        let (summary, ledger) = collector.end().map_err(collect_error)?;
+        let (summary, ledger, closed) = collector.end();
         terminal.clear();
         let mut report = CollectReport::new(&self.session, &files, &ledger, &summary, &ended, began.elapsed());
-        if let Some(lag) = remove_lag(&self.session, &files.robot, &files.rig).map_err(collect_error)? {
-            report.set_lag(&lag);
+        let lag = remove_lag(&self.session, &files.robot, &files.rig);
+        if let Ok(Some(lag)) = &lag {
+            report.set_lag(lag);
         }
         print(&report, self.output.json)?;
+        // What ended the run comes first: it is why the others failed, if they did.
         ended.map_err(collect_error)?;
+        closed.map_err(collect_error)?;
+        lag.map_err(collect_error)?;
         Ok(if report.is_complete() { Outcome::Good } else { Outcome::Doubtful })
     }
 
@@ -162,6 +195,7 @@ impl CollectArgs {
             Err(ListError::Number { flag, found: value.to_string(), expected: "a number above 0, at most 1e6" })
         };
         positive("--near-deg", self.near_deg)?;
+        positive("--near-mm", self.near_mm)?;
         let free_speed = JointSpeed {
             revolute_rad_s: positive("--speed-deg-s", self.speed_deg_s)?.to_radians(),
             prismatic_m_s: m_from_mm(positive("--speed-mm-s", self.speed_mm_s)?),
@@ -176,6 +210,7 @@ impl CollectArgs {
             free_speed,
             track: self.continuous.then_some(track),
             repeat: !self.no_repeat,
+            patience: COMING_TO_REST + Duration::from_micros(u64::from(self.stillness.criteria().hold_us)),
             ..CollectOptions::default()
         })
     }
@@ -199,7 +234,7 @@ impl CollectArgs {
     }
 
     fn nearness(&self) -> Nearness {
-        Nearness { turn_rad: self.near_deg.to_radians(), slide_m: m_from_mm(self.near_deg) }
+        Nearness { turn_rad: self.near_deg.to_radians(), slide_m: m_from_mm(self.near_mm) }
     }
 
     fn recorder(

@@ -57,7 +57,12 @@ impl EndRequest {
         let flag = Arc::new(AtomicBool::new(false));
         let set = Arc::clone(&flag);
         // A second handler is refused; the first one then ends the program as it always did.
-        let _ = ctrlc::set_handler(move || set.store(true, Ordering::Relaxed));
+        let _ = ctrlc::set_handler(move || {
+            if set.swap(true, Ordering::Relaxed) {
+                // Asked twice: whatever the work waits for is not worth it.
+                std::process::exit(130);
+            }
+        });
         Self(flag)
     }
 

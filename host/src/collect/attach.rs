@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
 
-use super::collector::Collector;
+use super::collector::{Bar, Collector};
 use super::errors::CollectError;
 use super::ledger::Joined;
 use super::operator::{Event, Wish};
@@ -23,64 +23,78 @@ const STEADY_US: u64 = 200_000;
 impl Collector<'_, '_> {
     /// Has the bar attached, and looks whether it is the right one. True when the operator wants to end instead.
     pub(super) fn attach(&mut self, joined: Joined) -> Result<bool, CollectError> {
-        if self.detach()? {
+        if matches!(self.bar, Bar::On(_)) && self.detach()? {
             return Ok(true);
         }
         let connection = self.connection(joined);
-        for attempt in 1..=ATTEMPTS {
+        for attempt in 1.. {
             self.operator.tell(&Event::Attach(&connection))?;
             if self.wait_for_confirmation()? {
                 return Ok(true);
             }
             match self.look_at_connection(joined) {
-                Ok(()) => {
-                    self.attached = Some(joined);
-                    self.board.recorder().connect(Some(connection.clone()));
-                    self.operator.tell(&Event::Attached(&connection))?;
-                    self.rearm()?;
-                    return Ok(false);
-                }
+                Ok(()) => break,
                 Err(wrong @ CollectError::WrongConnection { .. }) if attempt < ATTEMPTS => self.trouble(wrong.to_string())?,
                 Err(error) => return Err(error),
             }
         }
+        self.believe_on(joined)?;
+        self.rearm()?;
         Ok(false)
     }
 
-    /// Has the bar taken off, if it is on. True when the operator wants to end instead.
+    /// Has the bar taken off, unless it is known to be off. True when the operator wants to end instead.
     pub(super) fn detach(&mut self) -> Result<bool, CollectError> {
-        let Some(joined) = self.attached else { return Ok(false) };
-        let connection = self.connection(joined);
+        let connection = match self.bar {
+            Bar::Off => return Ok(false),
+            Bar::Unknown => None,
+            Bar::On(joined) => Some(self.connection(joined)),
+        };
         self.board.recorder().connect(None);
-        let before_m = self.board.view()?.displacement_m;
+        let before_m = self.board.ask()?.displacement_m;
         for attempt in 1..=ATTEMPTS {
-            self.operator.tell(&Event::Detach(&connection))?;
+            self.operator.tell(&Event::Detach(connection.as_ref()))?;
             if self.wait_for_confirmation()? {
                 return Ok(true);
             }
-            let now_us = self.board.now_us()?;
-            let now_m = self.board.view_after(now_us)?.displacement_m;
-            let is_still_on = before_m.zip(now_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() < STILL_ON_M);
-            if !is_still_on {
+            let confirmed_us = self.board.ask()?.t_us;
+            let now_m = self.board.view_after(confirmed_us)?.displacement_m;
+            let is_as_before = before_m.zip(now_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() < STILL_ON_M);
+            // Of a bar of which nothing is known, a length that stays may be that of one that hangs free.
+            if !is_as_before || connection.is_none() {
                 break;
             }
             if attempt == ATTEMPTS {
-                return Err(CollectError::StillOn { connection: self.words(joined) });
+                return Err(CollectError::StillOn { why: "the LVDT shows the same length as before".into() });
             }
             self.trouble("the LVDT shows the same length as before: is the bar off?".into())?;
         }
-        self.attached = None;
+        self.bar = Bar::Off;
         Ok(false)
+    }
+
+    /// The bar is on, which the LVDT has shown.
+    pub(super) fn believe_on(&mut self, joined: Joined) -> Result<(), CollectError> {
+        let connection = self.connection(joined);
+        self.bar = Bar::On(joined);
+        self.board.recorder().connect(Some(connection.clone()));
+        Ok(self.operator.tell(&Event::Attached(&connection))?)
+    }
+
+    /// Nobody knows where the bar is any more.
+    pub(super) fn lose_bar(&mut self) {
+        self.bar = Bar::Unknown;
+        self.board.recorder().connect(None);
     }
 
     /// Whether the bar that the LVDT shows now, if any, can be this one at the arm's place.
     pub(super) fn is_plausible(&mut self, joined: Joined) -> Result<bool, CollectError> {
-        let view = self.board.view()?;
+        let view = self.board.ask()?;
         Ok(view.displacement_m.is_some_and(|found_m| self.misfit(joined, &view.q, found_m) <= 1.0))
     }
 
     /// True when the operator wants to end.
-    fn wait_for_confirmation(&mut self) -> Result<bool, CollectError> {
+    pub(super) fn wait_for_confirmation(&mut self) -> Result<bool, CollectError> {
         loop {
             self.listen()?;
             match self.operator.wish() {
@@ -92,7 +106,7 @@ impl Collector<'_, '_> {
     }
 
     fn look_at_connection(&mut self, joined: Joined) -> Result<(), CollectError> {
-        let (began, confirmed_us) = (Instant::now(), self.board.now_us()?);
+        let (began, confirmed_us) = (Instant::now(), self.board.ask()?.t_us);
         let mut shown_since_us = None;
         while began.elapsed() < PATIENCE {
             self.listen()?;
@@ -101,7 +115,7 @@ impl Collector<'_, '_> {
                 None => shown_since_us = None,
                 Some(found_m) => {
                     let since_us = *shown_since_us.get_or_insert(view.t_us);
-                    if view.t_us - since_us >= STEADY_US {
+                    if view.t_us.saturating_sub(since_us) >= STEADY_US {
                         return self.judge(joined, &view.q, Some(found_m));
                     }
                 }

@@ -48,11 +48,16 @@ pub struct BoardWatch {
     view: Option<View>,
     stand: Option<Stand>,
     track: Option<Vec<TrackPoint>>,
+    is_watchful: bool,
     heard: Instant,
 }
 
 /// The stream has samples all the time: after this much silence something is wrong.
 const SILENCE: Duration = Duration::from_secs(3);
+/// The same while the robot moves: at 30 degrees per second it goes as many.
+const SILENCE_ON_THE_WAY: Duration = Duration::from_secs(1);
+/// How long the rest of a stream may take that was ended.
+const LAST_WORDS: Duration = Duration::from_secs(2);
 
 impl BoardWatch {
     /// Lets a board stream samples and settled poses.
@@ -71,7 +76,7 @@ impl BoardWatch {
         link.start_stream(StreamSelection { samples: true, settled: true, poses: false })?;
         let tally = StreamTally::default();
         let heard = Instant::now();
-        Ok(Self { link, robot, recorder, criteria, tally, view: None, stand: None, track: None, heard })
+        Ok(Self { link, robot, recorder, criteria, tally, view: None, stand: None, track: None, is_watchful: false, heard })
     }
 
     /// The parameters that the board uses.
@@ -90,12 +95,9 @@ impl BoardWatch {
     /// [`CollectError::Silent`], [`CollectError::Port`], [`CollectError::Record`].
     pub fn listen(&mut self) -> Result<(), CollectError> {
         let Some(frame) = self.link.next_frame()? else {
+            let silence = if self.is_watchful { SILENCE_ON_THE_WAY } else { SILENCE };
             let silent = self.heard.elapsed();
-            if silent > SILENCE {
-                let port = self.link.port_name().to_owned();
-                return Err(CollectError::Silent { port, seconds: silent.as_secs_f64() });
-            }
-            return Ok(());
+            return if silent > silence { Err(self.silent(silent)) } else { Ok(()) };
         };
         if let ToHost::Stream(stream) = &frame.message {
             self.heard = Instant::now();
@@ -103,6 +105,15 @@ impl BoardWatch {
             self.take(stream);
         }
         Ok(())
+    }
+
+    fn silent(&self, silent: Duration) -> CollectError {
+        CollectError::Silent { port: self.link.port_name().to_owned(), seconds: silent.as_secs_f64() }
+    }
+
+    /// While the robot moves, silence is put up with for a shorter time.
+    pub(super) fn be_watchful(&mut self, is_watchful: bool) {
+        self.is_watchful = is_watchful;
     }
 
     /// The latest sample; waits for the first one.
@@ -128,15 +139,23 @@ impl BoardWatch {
         self.stand.take()
     }
 
-    /// The board's time now, microseconds: what it says of earlier times may still be on its way.
+    /// The arm now: samples that the board took before may still be on their way.
     ///
     /// # Errors
     /// [`CollectError::Board`].
-    pub fn now_us(&mut self) -> Result<u64, CollectError> {
-        match self.link.request(Command::Status)? {
-            Answer::Status(status) => Ok(status.uptime_us),
-            _ => Err(BoardError::WrongAnswer { command: "status" }.into()),
-        }
+    pub fn ask(&mut self) -> Result<View, CollectError> {
+        let Answer::Status(status) = self.link.request(Command::Status)? else {
+            return Err(BoardError::WrongAnswer { command: "status" }.into());
+        };
+        let homed = status.encoders.iter().enumerate().map(|(i, encoder)| u8::from(encoder.is_homed) << i);
+        let displacement_m = self.robot.displacement_m(status.lvdt);
+        Ok(View {
+            t_us: status.uptime_us,
+            q: self.robot.q(status.encoders.iter().map(|encoder| f64::from(encoder.counts))),
+            displacement_m,
+            is_homed: self.robot.is_homed(homed.sum()),
+            off_since_us: displacement_m.is_none().then_some(status.uptime_us),
+        })
     }
 
     /// Lets the board report the pose at which the arm stands now, although it may have done so before. A time of the board's between
@@ -145,8 +164,9 @@ impl BoardWatch {
     /// # Errors
     /// [`CollectError::Board`].
     pub fn rearm(&mut self) -> Result<u64, CollectError> {
-        let now_us = self.now_us()?;
+        let now_us = self.ask()?.t_us;
         self.link.act(Command::SetStillness(self.criteria))?;
+        self.stand = None;
         Ok(now_us)
     }
 
@@ -155,9 +175,13 @@ impl BoardWatch {
     /// # Errors
     /// As [`BoardWatch::listen`].
     pub fn view_after(&mut self, t_us: u64) -> Result<View, CollectError> {
+        let began = Instant::now();
         loop {
             if let Some(view) = self.view.filter(|view| view.t_us > t_us) {
                 return Ok(view);
+            }
+            if began.elapsed() > SILENCE {
+                return Err(self.silent(began.elapsed()));
             }
             self.listen()?;
         }
@@ -174,25 +198,31 @@ impl BoardWatch {
         [displacement_m - least_m, most_m - displacement_m]
     }
 
-    /// Ends stream and session; tells what was lost.
-    ///
-    /// # Errors
-    /// [`CollectError::Record`].
-    pub fn end(mut self) -> Result<StreamLosses, CollectError> {
+    /// Ends stream and session; tells what was lost, and whether all could be written.
+    pub fn end(mut self) -> (StreamLosses, Result<(), CollectError>) {
         // A board that is gone by now needs no end.
         let _ = self.link.act(Command::StopStream);
         let status = self.link.request(Command::Status);
-        while let Ok(Some(frame)) = self.link.next_frame() {
+        let written = self.take_rest();
+        if let Ok(Answer::Status(status)) = status {
+            self.tally.end(&status as &Status);
+        }
+        let ended = self.recorder.end().map_err(CollectError::from);
+        (self.tally.losses(), written.and(ended))
+    }
+
+    /// What the board had gathered comes before its answers.
+    fn take_rest(&mut self) -> Result<(), CollectError> {
+        let began = Instant::now();
+        while let Ok(Some(frame)) = self.link.next_frame()
+            && began.elapsed() < LAST_WORDS
+        {
             if let ToHost::Stream(stream) = &frame.message {
                 self.recorder.frame(&frame.bytes)?;
                 self.take(stream);
             }
         }
-        if let Ok(Answer::Status(status)) = status {
-            self.tally.end(&status as &Status);
-        }
-        self.recorder.end()?;
-        Ok(self.tally.losses())
+        Ok(())
     }
 
     fn take(&mut self, stream: &Stream) {

@@ -1,22 +1,24 @@
 //! The walk over a plan.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
 
+use super::Nearness;
 use super::board_watch::{BoardWatch, Stand};
+use super::drive::Drive;
 use super::errors::CollectError;
 use super::follow::Guide;
 use super::ledger::{Joined, Ledger, RowState};
 use super::operator::{Event, Measured, Operator, Wish};
 use super::repeat::Repeat;
 use super::track::TrackOptions;
-use super::{Nearness, drive};
 use crate::board::StreamLosses;
 use crate::plan::Cell;
 use crate::robot_link::JointSpeed;
 use crate::session::{Connection, MeasuredPose};
+use crate::units::mm_from_m;
 
 /// How a plan is walked.
 #[derive(Clone, Debug)]
@@ -74,6 +76,32 @@ pub struct Summary {
     pub losses: StreamLosses,
 }
 
+/// Where the bar is, as far as is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Bar {
+    /// Nobody has said, and the LVDT tells nothing certain.
+    Unknown,
+    /// Taken off, as the operator has confirmed.
+    Off,
+    /// Attached, and the LVDT agrees.
+    On(Joined),
+}
+
+/// How waiting for a rest ended.
+pub(super) enum Rest {
+    /// The arm stands.
+    Still(Stand),
+    /// It does not come to rest.
+    Never,
+    /// There is no bar within its travel.
+    BarOff,
+    /// The operator wants to end.
+    Quit,
+}
+
+/// So long without a bar within its travel is no jolt, by the board's clock.
+const OFF_US: u64 = 100_000;
+
 /// Walks a plan.
 pub struct Collector<'a, 'o> {
     pub(super) cell: &'a Cell<'a>,
@@ -81,13 +109,16 @@ pub struct Collector<'a, 'o> {
     pub(super) board: BoardWatch,
     pub(super) operator: &'o mut dyn Operator,
     pub(super) options: CollectOptions,
-    pub(super) attached: Option<Joined>,
+    pub(super) bar: Bar,
+    /// Wishes that came while none could be carried out.
+    wishes: VecDeque<Wish>,
     /// Time of the board at which the latest move began: what stood still before is no measurement of this place.
     pub(super) since_us: u64,
     pub(super) summary: Summary,
     /// How the arm stood when rows were measured in this run.
     pub(super) stands: HashMap<usize, Stand>,
     missed_in_a_row: usize,
+    rows_done: usize,
     began: Instant,
     told: Instant,
 }
@@ -107,9 +138,24 @@ impl<'a, 'o> Collector<'a, 'o> {
         options: CollectOptions,
     ) -> Self {
         let (began, summary) = (Instant::now(), Summary::default());
-        let (attached, since_us, missed_in_a_row) = (None, 0, 0);
-        let stands = HashMap::new();
-        Self { cell, ledger, board, operator, options, attached, since_us, summary, stands, missed_in_a_row, began, told: began }
+        let (bar, since_us, missed_in_a_row) = (Bar::Unknown, 0, 0);
+        let (stands, wishes) = (HashMap::new(), VecDeque::new());
+        Self {
+            cell,
+            ledger,
+            board,
+            operator,
+            options,
+            bar,
+            wishes,
+            since_us,
+            summary,
+            stands,
+            missed_in_a_row,
+            rows_done: 0,
+            began,
+            told: began,
+        }
     }
 
     /// Measures all that is left, by moving the robot.
@@ -118,7 +164,7 @@ impl<'a, 'o> Collector<'a, 'o> {
     /// [`CollectError`] when it has to stop before; the robot was stopped then.
     pub fn drive(&mut self, robot: &mut dyn crate::robot_link::RobotLink) -> Result<Ended, CollectError> {
         self.check_board()?;
-        drive::Drive::new(self, robot).run()
+        Drive::new(self, robot).run()
     }
 
     /// Measures all that is left, while somebody or something else moves the robot: every pose at which it stands still counts for
@@ -131,13 +177,11 @@ impl<'a, 'o> Collector<'a, 'o> {
         self.follow_all(near, guide)
     }
 
-    /// Ends the stream and the session. What came of the run, and the plan with what is done of it.
-    ///
-    /// # Errors
-    /// [`CollectError::Record`].
-    pub fn end(self) -> Result<(Summary, Ledger<'a>), CollectError> {
-        let losses = self.board.end()?;
-        Ok((Summary { losses, ..self.summary }, self.ledger))
+    /// Ends the stream and the session. What came of the run, the plan with what is done of it, and whether the session could be
+    /// closed.
+    pub fn end(self) -> (Summary, Ledger<'a>, Result<(), CollectError>) {
+        let (losses, closed) = self.board.end();
+        (Summary { losses, ..self.summary }, self.ledger, closed)
     }
 
     /// Hears the board, and shows the operator the arm now and then.
@@ -152,13 +196,26 @@ impl<'a, 'o> Collector<'a, 'o> {
         Ok(())
     }
 
-    /// Carries out what the operator wishes meanwhile. True when the run is to end.
-    pub(super) fn obey(&mut self, target: Option<usize>) -> Result<bool, CollectError> {
+    /// Whether the operator wants to end. Other wishes are kept for [`Collector::obey`].
+    pub(super) fn wants_to_end(&mut self) -> bool {
         while let Some(wish) = self.operator.wish() {
+            if wish == Wish::Quit {
+                self.wishes.push_front(wish);
+                return true;
+            }
+            self.wishes.push_back(wish);
+        }
+        false
+    }
+
+    /// Carries out what the operator wished meanwhile; `target` finds the row that would be measured next. True when the run is to
+    /// end.
+    pub(super) fn obey(&mut self, target: impl Fn(&Ledger<'_>) -> Option<usize>) -> Result<bool, CollectError> {
+        while let Some(wish) = self.wishes.pop_front().or_else(|| self.operator.wish()) {
             match wish {
                 Wish::Quit => return Ok(true),
                 Wish::EraseLast => self.erase_last()?,
-                Wish::Skip => self.skip(target)?,
+                Wish::Skip => self.skip(target(&self.ledger))?,
                 Wish::Pause if self.pause()? => return Ok(true),
                 Wish::Pause | Wish::Confirm | Wish::Resume => {}
             }
@@ -167,10 +224,14 @@ impl<'a, 'o> Collector<'a, 'o> {
     }
 
     fn erase_last(&mut self) -> Result<(), CollectError> {
-        let line = self.board.recorder().erase_last()?;
-        if let Some(row) = line.and_then(|line| self.ledger.row_of_line(line)) {
+        let erased = self.board.recorder().erase_last()?;
+        if erased.poses == 0 {
+            return Ok(self.operator.tell(&Event::Trouble("there is no pose to erase"))?);
+        }
+        self.summary.written = self.summary.written.saturating_sub(erased.poses);
+        if let Some(row) = erased.plan_row.and_then(|line| self.ledger.row_of_line(line)) {
             self.ledger.set(row, RowState::Todo);
-            self.summary.written = self.summary.written.saturating_sub(1);
+            self.stands.remove(&row);
         }
         // An arm that still stands there is measured anew.
         self.rearm()?;
@@ -178,10 +239,9 @@ impl<'a, 'o> Collector<'a, 'o> {
     }
 
     fn skip(&mut self, target: Option<usize>) -> Result<(), CollectError> {
-        if let Some(row) = target {
-            self.board.recorder().skip(self.ledger.rows()[row].line)?;
-            self.ledger.set(row, RowState::Skipped);
-        }
+        let Some(row) = target else { return Ok(()) };
+        self.board.recorder().skip(self.ledger.rows()[row].line)?;
+        self.ledger.set(row, RowState::Skipped);
         Ok(self.operator.tell(&Event::Done(Wish::Skip))?)
     }
 
@@ -190,7 +250,7 @@ impl<'a, 'o> Collector<'a, 'o> {
         self.operator.tell(&Event::Done(Wish::Pause))?;
         loop {
             self.listen()?;
-            match self.operator.wish() {
+            match self.wishes.pop_front().or_else(|| self.operator.wish()) {
                 Some(Wish::Resume | Wish::Confirm) => {
                     self.operator.tell(&Event::Done(Wish::Resume))?;
                     return Ok(false);
@@ -202,18 +262,31 @@ impl<'a, 'o> Collector<'a, 'o> {
         }
     }
 
-    /// Waits until the arm stands still near a joint vector; `None` when it does not.
-    pub(super) fn stand_at(&mut self, q: &JointVector<f64>) -> Result<Option<Stand>, CollectError> {
+    /// Waits until the arm stands still near a joint vector, since the latest move.
+    pub(super) fn rest_at(&mut self, q: &JointVector<f64>) -> Result<Rest, CollectError> {
         let kinds = self.cell.robot.chain.joint_kinds();
         let began = Instant::now();
         while began.elapsed() < self.options.patience {
             self.listen()?;
+            if self.wants_to_end() {
+                return Ok(Rest::Quit);
+            }
+            if self.is_bar_gone()? {
+                return Ok(Rest::BarOff);
+            }
             let Some(stand) = self.board.take_stand() else { continue };
             if stand.began_us >= self.since_us && self.options.near.holds(kinds, &stand.q, q) {
-                return Ok(Some(stand));
+                return Ok(Rest::Still(stand));
             }
         }
-        Ok(None)
+        Ok(Rest::Never)
+    }
+
+    /// Whether the bar that should be on has not been within its travel for some time.
+    pub(super) fn is_bar_gone(&mut self) -> Result<bool, CollectError> {
+        let view = self.board.view()?;
+        let is_off = view.off_since_us.is_some_and(|since_us| view.t_us.saturating_sub(since_us) >= OFF_US);
+        Ok(is_off && matches!(self.bar, Bar::On(_)))
     }
 
     /// From here on a pose counts only if the arm stands still anew.
@@ -223,32 +296,42 @@ impl<'a, 'o> Collector<'a, 'o> {
     }
 
     /// Keeps a pose for a row, unless it cannot be one.
-    pub(super) fn keep(&mut self, row: usize, stand: Option<Stand>) -> Result<(), CollectError> {
+    pub(super) fn keep(&mut self, row: usize, stand: Stand) -> Result<(), CollectError> {
         let planned = &self.ledger.rows()[row];
-        let Some(stand) = stand else { return self.miss(row, "the arm did not come to stand still there") };
         let Some(displacement_m) = stand.displacement_m else { return self.miss(row, "the bar is beyond its travel there") };
-        let (computed_m, reserve_m) = self.cell.length(&stand.q, &self.cell.rig.pairing(planned.pairing));
-        let length_m = planned.bar_m + displacement_m;
-        let residual_m = length_m - computed_m;
+        let (residual_m, reserve_m) = self.residual_m(row, &stand.q, displacement_m);
         if residual_m.abs() > reserve_m {
+            let (residual_mm, reserve_mm) = (mm_from_m(residual_m), mm_from_m(reserve_m));
             let why = format!(
-                "the bar is {:+.1} mm longer than computed, more than any robot's parameters are plausibly off ({:.1} mm)",
-                residual_m * 1e3,
-                reserve_m * 1e3
+                "the bar is {residual_mm:+.1} mm longer than computed, more than any robot's parameters are plausibly off ({reserve_mm:.1} mm)"
             );
             return self.miss(row, &why);
         }
-        let pose = MeasuredPose { q: stand.q, displacement_m, t_s: stand.t_s, rate_m_s: None, plan_row: Some(planned.line) };
-        self.board.recorder().poses(&[pose])?;
+        let (t_s, plan_row) = (stand.t_s, Some(planned.line));
+        self.board.recorder().poses(&[MeasuredPose { q: stand.q, displacement_m, t_s, rate_m_s: None, plan_row }])?;
         self.stands.insert(row, stand);
-        self.ledger.set(row, RowState::Measured);
         self.summary.written += 1;
+        self.done(row, displacement_m, residual_m)
+    }
+
+    /// Measured less computed by the current model, and how far plausible robots may be off, metres.
+    pub(super) fn residual_m(&self, row: usize, q: &JointVector<f64>, displacement_m: f64) -> (f64, f64) {
+        let planned = &self.ledger.rows()[row];
+        let (computed_m, reserve_m) = self.cell.length(q, &self.cell.rig.pairing(planned.pairing));
+        (planned.bar_m + displacement_m - computed_m, reserve_m)
+    }
+
+    /// A row is measured.
+    pub(super) fn done(&mut self, row: usize, displacement_m: f64, residual_m: f64) -> Result<(), CollectError> {
+        self.ledger.set(row, RowState::Measured);
         self.missed_in_a_row = 0;
+        self.rows_done += 1;
+        let planned = &self.ledger.rows()[row];
         let measured = Measured {
             line: planned.line,
             done: self.ledger.count(&RowState::Measured),
             all: self.ledger.measurable(),
-            length_m,
+            length_m: planned.bar_m + displacement_m,
             travel_left_m: self.board.travel_left_m(displacement_m),
             residual_m,
             left: self.time_left(),
@@ -284,9 +367,9 @@ impl<'a, 'o> Collector<'a, 'o> {
     }
 
     /// At the pace of this run.
-    pub(super) fn time_left(&self) -> Duration {
-        let per_pose = self.began.elapsed().div_f64(self.summary.written.max(1) as f64);
-        per_pose.mul_f64(self.ledger.count(&RowState::Todo) as f64)
+    fn time_left(&self) -> Duration {
+        let per_row = self.began.elapsed().div_f64(self.rows_done.max(1) as f64);
+        per_row.mul_f64(self.ledger.count(&RowState::Todo) as f64)
     }
 
     /// The board's robot is the plan's, and knows where it is.
@@ -307,6 +390,13 @@ impl<'a, 'o> Collector<'a, 'o> {
                 let (found, expected) = (on_board.counts_per_unit, encoder.counts_per_unit);
                 return other(format!("joint {} has {found} counts a radian or metre, in the plan's robot {expected}", i + 1));
             }
+        }
+        let couplings: Vec<_> = robot.encoders.iter().flat_map(|facts| &facts.couplings).collect();
+        let is_same = |(a, b): (&ballbar::Coupling<f32>, &&ballbar::Coupling<f64>)| {
+            (a.joint, a.driven_by, a.ratio) == (b.joint, b.driven_by, b.ratio as f32)
+        };
+        if board.set().couplings.len() != couplings.len() || !board.set().couplings.iter().zip(&couplings).all(is_same) {
+            return other("its couplings between joints are others".into());
         }
         if !self.board.view()?.is_homed {
             return Err(CollectError::NotHomed);

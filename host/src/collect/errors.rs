@@ -128,11 +128,20 @@ pub enum CollectError {
         hint: String,
     },
     /// The bar that should be off is on.
-    #[error("{connection}: the bar should be off, but the LVDT shows the same length as before")]
+    #[error("the bar should be off, but {why}; the robot stands")]
     #[diagnostic(help("Take the bar off before the robot moves on, and run the same command again."))]
     StillOn {
-        /// `A:1 with the 460 mm bar`.
-        connection: String,
+        /// What tells.
+        why: String,
+    },
+    /// The arm is not where the run left it.
+    #[error("the robot was moved away from the plan's way to line {line}, and no clear way leads back")]
+    #[diagnostic(help("Drive it back near {target}, and run the same command again."))]
+    Moved {
+        /// Line of plan.csv.
+        line: usize,
+        /// Joint vector of the row where it was.
+        target: String,
     },
     /// Row after row cannot be had.
     #[error("{count} rows in a row could not be measured, the last one line {line}: {why}")]

@@ -42,7 +42,13 @@ impl Collector<'_, '_> {
             }
             match programs {
                 None => self.tell_where(first)?,
-                Some(programs) => self.operator.tell(&Event::Start(&programs.approach))?,
+                Some(programs) => {
+                    // From the row before the shell its first row was found clear.
+                    if self.wait_near(shell.start.saturating_sub(1)..=shell.start)? {
+                        return Ok(Ended::Quit);
+                    }
+                    self.operator.tell(&Event::Start(&programs.approach))?;
+                }
             }
             if self.attach(joined(&self.ledger.rows()[first]))? {
                 return Ok(Ended::Quit);
@@ -65,15 +71,37 @@ impl Collector<'_, '_> {
                 told = Some(target);
                 self.tell_where(target)?;
             }
-            if self.obey(Some(target))? {
+            if self.obey(|ledger| shell.clone().find(|&row| *ledger.state(row) == RowState::Todo))? {
                 return Ok(true);
             }
             self.listen()?;
-            if let Some(stand) = self.board.take_stand() {
+            let since_us = self.since_us;
+            if let Some(stand) = self.board.take_stand().filter(|stand| stand.began_us >= since_us) {
                 self.take_followed(shell, near, stand)?;
             }
         }
         Ok(false)
+    }
+
+    /// Waits until the arm is near one of some rows; says where to, if it is not. True when the operator wants to end.
+    fn wait_near(&mut self, rows: std::ops::RangeInclusive<usize>) -> Result<bool, CollectError> {
+        let kinds = self.cell.robot.chain.joint_kinds();
+        let goal = *rows.start();
+        let mut is_told = false;
+        loop {
+            let q = self.board.view()?.q;
+            if rows.clone().any(|row| self.options.near.holds(kinds, &self.ledger.rows()[row].q, &q)) {
+                return Ok(false);
+            }
+            if !is_told {
+                is_told = true;
+                self.tell_where(goal)?;
+            }
+            if self.wants_to_end() {
+                return Ok(true);
+            }
+            self.listen()?;
+        }
     }
 
     fn todo(&self, shell: &Range<usize>) -> Option<usize> {
@@ -99,6 +127,6 @@ impl Collector<'_, '_> {
         if *self.ledger.state(row) != RowState::Todo {
             return Ok(());
         }
-        self.keep(row, Some(stand))
+        self.keep(row, stand)
     }
 }

@@ -16,6 +16,7 @@ mod collector;
 mod drive;
 mod errors;
 mod follow;
+mod go;
 mod lag;
 mod ledger;
 mod operator;

@@ -46,8 +46,8 @@ pub struct Measured {
 pub enum Event<'a> {
     /// Attach this, and confirm.
     Attach(&'a Connection),
-    /// Take this off, and confirm.
-    Detach(&'a Connection),
+    /// Take this off, or whatever is on, and confirm.
+    Detach(Option<&'a Connection>),
     /// The bar that is attached is what the plan asks for.
     Attached(&'a Connection),
     /// Drive the robot near these joint values (revolute joints radians, prismatic ones metres).

@@ -8,7 +8,6 @@ use ballbar::{JointKind, JointVector};
 use super::collector::Collector;
 use super::errors::CollectError;
 use super::ledger::RowState;
-use super::operator::{Event, Measured};
 use crate::session::MeasuredPose;
 
 /// How an arm that moves is measured.
@@ -56,7 +55,7 @@ const LEAST_SAMPLES: usize = 5;
 /// Poses of a move, none of them at its standing ends.
 pub(super) fn poses(points: &[TrackPoint], kinds: &[JointKind], options: &TrackOptions) -> Vec<MovingPose> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
-    let count = ((last.t_s - first.t_s) / options.every_s).floor() as usize;
+    let count = (((last.t_s - first.t_s) / options.every_s).floor() as usize).min(points.len());
     let piece = |i: usize| {
         let middle_s = first.t_s + (i as f64 + 0.5) * options.every_s;
         let start = points.partition_point(|point| point.t_s < middle_s - options.mean_s / 2.0);
@@ -93,10 +92,8 @@ impl Collector<'_, '_> {
     /// Keeps the poses of a move to a row, which is then measured.
     pub(super) fn keep_moving(&mut self, row: usize, poses: &[MovingPose]) -> Result<(), CollectError> {
         let planned = &self.ledger.rows()[row];
-        let pairing = self.cell.rig.pairing(planned.pairing);
         let residual = |pose: &MovingPose| {
-            let (computed_m, reserve_m) = self.cell.length(&pose.q, &pairing);
-            let residual_m = planned.bar_m + pose.displacement_m - computed_m;
+            let (residual_m, reserve_m) = self.residual_m(row, &pose.q, pose.displacement_m);
             (residual_m.abs() <= reserve_m).then_some(residual_m)
         };
         let kept: Vec<(&MovingPose, f64)> = poses.iter().filter_map(|pose| Some((pose, residual(pose)?))).collect();
@@ -111,20 +108,7 @@ impl Collector<'_, '_> {
         };
         self.board.recorder().poses(&kept.iter().map(measured).collect::<Vec<_>>())?;
         self.summary.written += kept.len();
-        if plan_row.is_none() {
-            return Ok(());
-        }
-        self.ledger.set(row, RowState::Measured);
-        let measured = Measured {
-            line: planned.line,
-            done: self.ledger.count(&RowState::Measured),
-            all: self.ledger.measurable(),
-            length_m: planned.bar_m + last.displacement_m,
-            travel_left_m: self.board.travel_left_m(last.displacement_m),
-            residual_m,
-            left: self.time_left(),
-        };
-        Ok(self.operator.tell(&Event::Measured(&measured))?)
+        if plan_row.is_some() { self.done(row, last.displacement_m, residual_m) } else { Ok(()) }
     }
 }
 

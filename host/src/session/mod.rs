@@ -16,7 +16,7 @@ mod recorder;
 pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
 pub use export::{ExportError, export_csv};
 pub use log::{LogError, LogReader, LogSummary, LogWriter, Record};
-pub use pose_file::{PoseFile, PoseFileError, SettledRow};
+pub use pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 pub use recorder::{Connection, MeasuredPose, RecordError, Recorder};
 
 /// Name of the log in a session.

@@ -40,6 +40,15 @@ pub struct PoseFile {
     added: usize,
 }
 
+/// What was taken out again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Erased {
+    /// How many poses.
+    pub poses: usize,
+    /// The line of plan.csv that they were measured for.
+    pub plan_row: Option<usize>,
+}
+
 /// The optional columns that a session's poses have.
 const COLUMNS: [&str; 5] = ["t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
 /// Where some of them stand, counted from the end of a line.
@@ -119,16 +128,23 @@ impl PoseFile {
         Ok(())
     }
 
-    /// Takes the latest pose out again and writes the file. Gives the line of plan.csv that it was measured for; `None` when there
-    /// was no pose, or one of no plan.
+    /// Takes the latest pose out again, with all others before it of the same line of plan.csv, and writes the file.
     ///
     /// # Errors
     /// [`PoseFileError::Write`].
-    pub fn erase_last(&mut self) -> Result<Option<usize>, PoseFileError> {
-        let Some(line) = self.lines.pop() else { return Ok(None) };
+    pub fn erase_last(&mut self) -> Result<Erased, PoseFileError> {
+        let is_pose = |line: &String| !line.trim().is_empty() && !line.starts_with('#');
+        let Some(last) = self.lines.iter().rposition(is_pose) else { return Ok(Erased::default()) };
+        let of_line = plan_row(&self.lines[last]);
+        let is_other = |line: &String| is_pose(line) && plan_row(line) != of_line;
+        let first = self.lines[..last].iter().rposition(is_other).map_or(0, |other| other + 1);
+        let before = self.lines.len();
+        let mut index = 0..;
+        self.lines.retain(|line| index.next().is_some_and(|i| i < first) || !is_pose(line));
         self.write()?;
-        self.added = self.added.saturating_sub(1);
-        Ok(plan_row(&line))
+        let poses = before - self.lines.len();
+        self.added = self.added.saturating_sub(poses);
+        Ok(Erased { poses, plan_row: of_line })
     }
 
     /// Removes a lag of the LVDT from the lengths of moving arms, instead of what was removed before, and writes the file.

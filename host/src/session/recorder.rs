@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use super::description::{Description, DescriptionError, Run};
 use super::log::{LogError, LogWriter, unix_ms};
-use super::pose_file::{PoseFile, PoseFileError, SettledRow};
+use super::pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 use super::{LOG_NAME, POSES_NAME};
 
 /// Why a recording cannot begin or go on.
@@ -36,6 +36,9 @@ pub enum RecordError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Poses(#[from] PoseFileError),
+    /// Poses while nobody has said what the bar joins.
+    #[error("a pose was to be kept without a connection of the bar")]
+    NotConnected,
 }
 
 /// Which ends the bar joined, and how long it is.
@@ -116,24 +119,24 @@ impl Recorder {
         self.poses.is_some() && self.connection.is_some()
     }
 
-    /// Keeps poses; does nothing without a connection.
+    /// Keeps poses.
     ///
     /// # Errors
-    /// [`RecordError::Poses`].
+    /// [`RecordError::Poses`], [`RecordError::NotConnected`].
     pub fn poses(&mut self, poses: &[MeasuredPose]) -> Result<(), RecordError> {
-        if let (Some(file), Some(Connection { chuck, sphere, bar_m })) = (&mut self.poses, &self.connection) {
-            file.add(poses.iter().map(|pose| SettledRow {
-                chuck,
-                sphere,
-                q: pose.q,
-                length_m: bar_m + pose.displacement_m,
-                t_s: pose.t_s,
-                bar_m: *bar_m,
-                rate_m_s: pose.rate_m_s,
-                plan_row: pose.plan_row,
-            }))?;
-        }
-        Ok(())
+        let (Some(file), Some(Connection { chuck, sphere, bar_m })) = (&mut self.poses, &self.connection) else {
+            return Err(RecordError::NotConnected);
+        };
+        Ok(file.add(poses.iter().map(|pose| SettledRow {
+            chuck,
+            sphere,
+            q: pose.q,
+            length_m: bar_m + pose.displacement_m,
+            t_s: pose.t_s,
+            bar_m: *bar_m,
+            rate_m_s: pose.rate_m_s,
+            plan_row: pose.plan_row,
+        }))?)
     }
 
     /// Lines of plan.csv that poses were kept for, over all runs.
@@ -157,12 +160,12 @@ impl Recorder {
         Ok(self.description.write(&self.session)?)
     }
 
-    /// Takes the latest pose out again; gives its line of plan.csv.
+    /// Takes the latest pose, or all those of the latest move, out again.
     ///
     /// # Errors
     /// [`RecordError::Poses`].
-    pub fn erase_last(&mut self) -> Result<Option<usize>, RecordError> {
-        Ok(self.poses.as_mut().map_or(Ok(None), PoseFile::erase_last)?)
+    pub fn erase_last(&mut self) -> Result<Erased, RecordError> {
+        Ok(self.poses.as_mut().map_or(Ok(Erased::default()), PoseFile::erase_last)?)
     }
 
     /// Notes that the port was lost.

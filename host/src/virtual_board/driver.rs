@@ -76,7 +76,7 @@ pub fn driver() -> (Driver, Driven) {
 }
 
 impl Driver {
-    /// Gives an order, which takes the place of the one under way.
+    /// Gives an order, which takes the place of those that wait; a move under way is finished first, unless it is halted.
     pub fn give(&mut self, order: Order) {
         self.given += 1;
         // Without the plant there is nothing to drive.

@@ -182,6 +182,7 @@ impl Plant {
 
     /// The bar comes off, wherever the robot is.
     pub fn drop_bar(&mut self) {
+        self.waiting.iter_mut().for_each(|station| station.bar = None);
         match &mut self.phase {
             Phase::Rest(rest) => rest.bar = None,
             Phase::Move(movement) => movement.drop_bar(),

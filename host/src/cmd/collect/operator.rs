@@ -33,8 +33,8 @@ pub(super) struct Terminal {
     hand: Hand,
     kinds: Vec<JointKind>,
     end: EndRequest,
-    /// Lines typed; gone when there is no more.
-    lines: Option<Receiver<String>>,
+    /// Lines typed.
+    lines: Receiver<String>,
     line: LiveLine,
     /// A confirmation of what the hand did by itself.
     is_done: bool,
@@ -45,7 +45,7 @@ pub(super) struct Terminal {
 impl Terminal {
     pub(super) fn new(hand: Hand, kinds: &[JointKind], end: EndRequest) -> Self {
         let kinds = kinds.to_vec();
-        Self { hand, kinds, end, lines: Some(typed_lines()), line: LiveLine::new(), is_done: false, is_asked: false }
+        Self { hand, kinds, end, lines: typed_lines(), line: LiveLine::new(), is_done: false, is_asked: false }
     }
 
     pub(super) fn clear(&self) {
@@ -70,9 +70,9 @@ impl Terminal {
         Ok(())
     }
 
-    fn ask(&mut self, what: &str, bar: &Connection) {
+    fn ask(&mut self, what: &str, bar: String) {
         let ending = if matches!(self.hand, Hand::Person) { ". Enter when done." } else { "" };
-        self.line.note(&format!("{what} {}{ending}", words(bar)));
+        self.line.note(&format!("{what} {bar}{ending}"));
     }
 
     fn show(&mut self, view: &View) {
@@ -88,11 +88,11 @@ impl Operator for Terminal {
     fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
         match event {
             Event::Attach(bar) => {
-                self.ask("Attach", bar);
+                self.ask("Attach", words(bar));
                 self.attach(Some(bar))?;
             }
             Event::Detach(bar) => {
-                self.ask("Take off", bar);
+                self.ask("Take off", bar.map_or("the bar, if it is on".into(), words));
                 self.attach(None)?;
             }
             Event::Attached(bar) => self.line.note(&format!("attached: {}", words(bar))),
@@ -115,7 +115,7 @@ impl Operator for Terminal {
             Event::Missed { line, why } => self.line.note(&format!("line {line}: NOT MEASURED: {why}")),
             Event::Done(wish) => self.line.note(match wish {
                 Wish::EraseLast => "the last pose is erased",
-                Wish::Skip => "the next pose is skipped",
+                Wish::Skip => "a pose is skipped",
                 Wish::Pause => "paused; r and Enter to go on",
                 Wish::Resume => "going on",
                 Wish::Confirm | Wish::Quit => "",
@@ -134,7 +134,7 @@ impl Operator for Terminal {
         if std::mem::take(&mut self.is_done) {
             return Some(Wish::Confirm);
         }
-        match self.lines.as_ref()?.try_recv() {
+        match self.lines.try_recv() {
             Ok(line) => self.read(&line),
             Err(TryRecvError::Empty) => None,
             // Nobody is there any more: nobody can attach the bar.
