@@ -4,6 +4,8 @@ pub mod any_message;
 #[cfg(unix)]
 pub mod bridge;
 pub mod command;
+#[cfg(unix)]
+pub mod crew;
 pub mod data;
 #[cfg(unix)]
 pub mod emulator;

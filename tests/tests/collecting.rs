@@ -1,86 +1,22 @@
 //! `host-cal collect` over a virtual board and a simulated robot, with robots, bars and people that do not what they should.
 #![cfg(unix)]
 
-use std::collections::VecDeque;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
 use ballbar_tests::command::host_cal_command;
-use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, column, plant, quick};
+use ballbar_tests::crew::Crew;
+use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, column, design, plant, quick, rig};
 use host_cal::collect::{CollectError, Ended, Event, Operator, RowState, Wish};
-use host_cal::robot_link::sim::{SimClient, SimHand, SimLink, SimRequest};
+use host_cal::robot_link::sim::{SimClient, SimLink, SimRequest};
 use host_cal::robot_link::{JointSpeed, LinkError, MoveState, RobotLink};
-use host_cal::session::Connection;
 use host_cal::virtual_board::{Order, driver};
 
 const SIGMA_M: f64 = 7e-5;
 
 fn cell() -> SimulatedCell {
     SimulatedCell::start(plant(3), SIGMA_M, &SHORT_PLAN)
-}
-
-/// The simulation's hand, with wishes that come when so many poses were measured, and a grip that may be wrong.
-struct Crew {
-    hand: SimHand,
-    is_done: bool,
-    measured: usize,
-    wishes: VecDeque<(usize, Wish)>,
-    /// How often the bar is attached to the wrong sphere before it is attached as asked for.
-    wrong: usize,
-    /// How often it is left on when it should come off.
-    left_on: usize,
-    told: Vec<String>,
-}
-
-impl Crew {
-    fn new(cell: &SimulatedCell) -> Self {
-        let (wishes, told) = (VecDeque::new(), Vec::new());
-        Self { hand: cell.hand(), is_done: false, measured: 0, wishes, wrong: 0, left_on: 0, told }
-    }
-
-    fn wishing(cell: &SimulatedCell, wishes: &[(usize, Wish)]) -> Self {
-        Self { wishes: wishes.iter().copied().collect(), ..Self::new(cell) }
-    }
-
-    fn attach(&mut self, bar: &Connection) -> Result<(), LinkError> {
-        let is_wrong = self.wrong > 0;
-        self.wrong = self.wrong.saturating_sub(1);
-        let chuck = if is_wrong { "B".to_owned() } else { bar.chuck.clone() };
-        self.hand.act(&SimRequest::Attach { chuck, sphere: bar.sphere.clone(), mid_m: bar.bar_m })
-    }
-}
-
-impl Operator for Crew {
-    fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
-        match event {
-            Event::Attach(bar) => {
-                self.attach(bar)?;
-                self.is_done = true;
-            }
-            Event::Detach(_) => {
-                if self.left_on > 0 {
-                    self.left_on -= 1;
-                } else {
-                    self.hand.act(&SimRequest::Detach)?;
-                }
-                self.is_done = true;
-            }
-            Event::Measured(_) => self.measured += 1,
-            Event::Now(_) => return Ok(()),
-            _ => {}
-        }
-        self.told.push(format!("{event:?}"));
-        Ok(())
-    }
-
-    fn wish(&mut self) -> Option<Wish> {
-        if std::mem::take(&mut self.is_done) {
-            return Some(Wish::Confirm);
-        }
-        let is_due = self.wishes.front().is_some_and(|(measured, _)| self.measured >= *measured);
-        if is_due { self.wishes.pop_front().map(|(_, wish)| wish) } else { None }
-    }
 }
 
 /// A controller that does as it should but at one move, counted from the first.
@@ -306,7 +242,7 @@ fn a_move_that_faults_is_tried_again() {
     let mut link = Flawed::new(&cell, Flaw::Faults, 6, 2);
     let collected = cell.collect_with("session", Some(&mut link), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done, "{:?}", crew.told);
-    assert_eq!(collected.summary.troubles.len(), 2, "{:?}", collected.summary.troubles);
+    assert_eq!(collected.summary.troubles.len(), 2, "{:?}", crew.told);
     assert!(collected.summary.troubles[0].contains("*Envelope error*"));
     assert_all_measured(&cell, "session");
 }
@@ -364,14 +300,14 @@ fn a_bar_that_comes_off_stops_the_robot_and_is_attached_again() {
 #[test]
 fn a_bar_that_is_attached_elsewhere_is_noticed() {
     let cell = cell();
-    let mut crew = Crew { wrong: 1, ..Crew::new(&cell) };
+    let mut crew = Crew::new(&cell).wrong(1);
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert!(collected.summary.troubles[0].contains("A:1 with the 460 mm bar"), "{:?}", collected.summary.troubles);
     assert_all_measured(&cell, "session");
 
     let cell = self::cell();
-    let mut crew = Crew { wrong: 3, ..Crew::new(&cell) };
+    let mut crew = Crew::new(&cell).wrong(3);
     let collected = cell.collect_with("other", Some(&mut cell.link()), &mut crew, quick());
     assert!(matches!(collected.ended, Err(CollectError::WrongConnection { .. })), "{:?}", collected.ended);
     assert_eq!(measured_lines(&cell, "other").len(), 0);
@@ -381,13 +317,13 @@ fn a_bar_that_is_attached_elsewhere_is_noticed() {
 fn a_bar_that_is_still_on_keeps_the_robot_where_it_is() {
     let cell = cell();
     // The first time nobody knows whether it is on.
-    let mut crew = Crew { left_on: 2, ..Crew::new(&cell) };
+    let mut crew = Crew::new(&cell).left_on(2);
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert!(collected.summary.troubles.iter().any(|words| words.contains("is the bar off?")), "{:?}", crew.told);
 
     let cell = self::cell();
-    let mut crew = Crew { left_on: 4, ..Crew::new(&cell) };
+    let mut crew = Crew::new(&cell).left_on(4);
     let collected = cell.collect_with("other", Some(&mut cell.link()), &mut crew, quick());
     assert!(matches!(collected.ended, Err(CollectError::StillOn { .. })), "{:?}", collected.ended);
 }
@@ -504,4 +440,146 @@ fn a_board_that_falls_silent_ends_the_run() {
         collected.ended
     );
     assert_eq!(measured_lines(&cell, "session").len(), collected.count(&RowState::Measured));
+}
+
+#[test]
+fn an_operator_who_quits_stops_the_robot_on_its_way() {
+    let cell = cell();
+
+    /// Quits when the bar was on for a while: during the slow move.
+    struct Quits {
+        crew: Crew,
+        looks: usize,
+    }
+    impl Operator for Quits {
+        fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
+            self.crew.tell(event)
+        }
+        fn wish(&mut self) -> Option<Wish> {
+            self.looks += usize::from(self.crew.measured >= 1);
+            if self.looks > 300 { Some(Wish::Quit) } else { self.crew.wish() }
+        }
+    }
+    let mut quits = Quits { crew: Crew::new(&cell), looks: 0 };
+    let mut link = Slow(cell.link());
+    let collected = cell.collect_with("session", Some(&mut link), &mut quits, quick());
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Quit);
+    let stopped = link.joints().unwrap().unwrap();
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(link.joints().unwrap().unwrap(), stopped);
+    let at_a_row = collected.rows.iter().any(|row| (row.q.as_array()[0] - stopped.as_array()[0]).abs() < 1e-4);
+    assert!(!at_a_row, "it was stopped between rows");
+}
+
+/// So slow with the bar on that no move ends within a test.
+struct Slow(SimLink);
+
+impl RobotLink for Slow {
+    fn name(&self) -> String {
+        "slow".into()
+    }
+    fn start_move(&mut self, q: &JointVector<f64>, speed: &JointSpeed) -> Result<(), LinkError> {
+        let with_bar = self.0.joints()?.is_some_and(|from| (from.as_array()[0] - q.as_array()[0]).abs() < 0.2);
+        let slower = if with_bar { 500.0 } else { 1.0 };
+        self.0.start_move(q, &JointSpeed { revolute_rad_s: speed.revolute_rad_s / slower, ..*speed })
+    }
+    fn poll(&mut self) -> Result<MoveState, LinkError> {
+        self.0.poll()
+    }
+    fn joints(&mut self) -> Result<Option<JointVector<f64>>, LinkError> {
+        self.0.joints()
+    }
+    fn stop(&mut self) -> Result<(), LinkError> {
+        self.0.stop()
+    }
+    fn recover(&mut self) -> Result<(), LinkError> {
+        self.0.recover()
+    }
+}
+
+#[test]
+fn an_arm_that_was_moved_during_a_pause_is_brought_back() {
+    let cell = cell();
+
+    /// During the pause somebody jogs the arm, the bar on.
+    struct Jogs {
+        crew: Crew,
+        link: SimLink,
+        rows: Vec<host_cal::files::PlanRow>,
+        is_jogged: bool,
+    }
+    impl Operator for Jogs {
+        fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
+            if matches!(event, Event::Done(Wish::Pause)) && !self.is_jogged {
+                self.is_jogged = true;
+                let stood = self.link.joints()?.unwrap();
+                // To some row of the same shell, which is a place with the bar inside its travel.
+                let other = self.rows.iter().rev().find(|row| row.bar.is_some() && row.pairing == self.rows[1].pairing).unwrap();
+                assert!((other.q.as_array()[0] - stood.as_array()[0]).abs() > 0.02);
+                self.link.start_move(&other.q, &JointSpeed::default())?;
+                while self.link.poll()? == MoveState::Moving {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+            }
+            self.crew.tell(event)
+        }
+        fn wish(&mut self) -> Option<Wish> {
+            self.crew.wish()
+        }
+    }
+    let crew = Crew::wishing(&cell, &[(2, Wish::Pause), (2, Wish::Resume)]);
+    let mut jogs = Jogs { crew, link: cell.link(), rows: cell.rows(), is_jogged: false };
+    let collected = cell.collect_with("session", Some(&mut cell.link()), &mut jogs, quick());
+    match &collected.ended {
+        Ok(ended) => {
+            assert_eq!(*ended, Ended::Done);
+            assert!(collected.summary.troubles.iter().any(|words| words.contains("was moved")), "{:?}", jogs.crew.told);
+            assert_all_measured(&cell, "session");
+        }
+        // Without a clear way back nothing moves.
+        Err(CollectError::Moved { .. }) => {}
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn a_bar_that_follows_the_robot_is_not_off() {
+    let cell = cell();
+    let mut link = cell.link();
+    let mut hand = cell.hand();
+    let move_to = |link: &mut SimLink, q: &JointVector<f64>| {
+        link.start_move(q, &JointSpeed::default()).unwrap();
+        while link.poll().unwrap() == MoveState::Moving {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    };
+    // Beside the plan, with the bar on, where the way to the plan changes its length.
+    let row = cell.rows()[0].q;
+    let pairing = rig().pairing(cell.rows()[0].pairing);
+    let kinematics = ballbar::Kinematics::new(&design().chain);
+    let beside = (0..6).flat_map(|joint| [0.02, 0.05].map(|by| (joint, by))).map(|(joint, by)| {
+        let mut q = row;
+        q.as_array_mut()[joint] += by;
+        q
+    });
+    let change_m = |q: &JointVector<f64>| (kinematics.length(q, &pairing) - kinematics.length(&row, &pairing)).abs();
+    let q =
+        beside.into_iter().find(|q| (0.004..0.015).contains(&change_m(q))).expect("some joint moves the sphere along the bar");
+    move_to(&mut link, &q);
+    hand.act(&SimRequest::Attach { chuck: "A".into(), sphere: "1".into(), mid_m: 0.46 }).unwrap();
+    let mut crew = Crew::new(&cell).left_on(1);
+    let collected = cell.collect_with("session", Some(&mut link), &mut crew, quick());
+    assert!(matches!(collected.ended, Err(CollectError::StillOn { .. })), "{:?} {:?}", collected.ended, crew.told);
+}
+
+#[test]
+fn a_plan_that_leads_into_something_is_not_driven() {
+    let cell = cell();
+    // Without its via points the way is no way.
+    let straight: String = cell.plan.lines().filter(|line| !line.starts_with("via")).flat_map(|line| [line, "\n"]).collect();
+    std::fs::write(cell.path("plan.csv"), straight).unwrap();
+    let run = cell.collect("session", &[]);
+    assert_eq!(run.code, 2, "{}", run.transcript());
+    assert!(run.stderr.contains("the plan has "), "{}", run.stderr);
+    assert!(!cell.path("session").exists());
 }

@@ -225,8 +225,22 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
         Err(CollectError::Blocked { line, why: why.to_owned() })
     }
 
-    /// By a way that is searched for.
+    /// By a way that is searched for, anew from where the robot stands when it has failed.
     fn go_clear(&mut self, joined: Option<Joined>, q: &JointVector<f64>, row: usize) -> Result<Clear, CollectError> {
+        let mut ended = self.try_clear(joined, q, row)?;
+        for _ in 0..RETRIES {
+            let is_as_before = joined.is_none_or(|joined| self.collector.bar == Bar::On(joined));
+            match &ended {
+                Clear::Failed(why) if is_as_before => self.collector.trouble(format!("{why}; trying again"))?,
+                _ => break,
+            }
+            self.robot.recover()?;
+            ended = self.try_clear(joined, q, row)?;
+        }
+        Ok(ended)
+    }
+
+    fn try_clear(&mut self, joined: Option<Joined>, q: &JointVector<f64>, row: usize) -> Result<Clear, CollectError> {
         let from = self.collector.board.ask()?.q;
         let Some(vias) = plan::way_between(self.collector.cell, joined, &from, q, SEED) else { return Ok(Clear::NoWay) };
         for q in vias.iter().chain([q]) {

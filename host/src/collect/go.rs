@@ -110,7 +110,10 @@ impl Drive<'_, '_, '_, '_> {
             polled = Instant::now();
             match self.robot.poll()? {
                 MoveState::Moving => {}
-                MoveState::Reached => return self.confirm_arrival(q, row).map(|()| Go::Arrived),
+                MoveState::Reached => {
+                    self.confirm_arrival(q, row)?;
+                    return self.check_free_bar(from).map(|()| Go::Arrived);
+                }
                 MoveState::Refused(why) => return Ok(Go::Refused(why)),
                 MoveState::Fault(why) => return Ok(Go::Failed(why)),
                 MoveState::TimedOut(time) => {
