@@ -185,15 +185,6 @@ fn measured_lines(cell: &SimulatedCell, session: &str) -> Vec<String> {
     column(&cell.path(session), "plan_row")
 }
 
-/// Every row of the plan that is to be measured is in the session once.
-fn assert_all_measured(cell: &SimulatedCell, session: &str) {
-    let mut lines: Vec<usize> = measured_lines(cell, session).iter().map(|line| line.parse().unwrap()).collect();
-    lines.sort_unstable();
-    let expected: Vec<usize> =
-        (cell.plan.lines().enumerate()).filter(|(_, line)| line.starts_with("measure")).map(|(i, _)| i + 1).collect();
-    assert_eq!(lines, expected);
-}
-
 #[test]
 fn a_plan_is_walked_to_its_end_without_a_hand_on_it() {
     let cell = cell();
@@ -203,7 +194,7 @@ fn a_plan_is_walked_to_its_end_without_a_hand_on_it() {
     assert_eq!((&report["status"], &report["measured"], &report["left"]), (&"done".into(), &24.into(), &0.into()));
     assert_eq!(report["losses"]["missing"], 0);
     assert!(report["repeats"].as_array().unwrap().iter().all(|repeat| repeat["difference_mm"].as_f64().unwrap().abs() < 1.0));
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
     for name in ["plan.csv", "robot.toml", "rig.toml", "stream.bbl", "session.toml"] {
         assert!(cell.path("session").join(name).is_file(), "{name}");
     }
@@ -218,7 +209,7 @@ fn a_plan_is_walked_to_its_end_without_a_hand_on_it() {
     // There is nothing left to do.
     let run = cell.collect("session", &["--json"]);
     assert_eq!((run.code, &run.json()["poses_written"]), (0, &0.into()), "{}", run.transcript());
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 }
 
 #[test]
@@ -254,7 +245,7 @@ fn a_killed_collection_goes_on_where_it_was_and_measures_nothing_twice() {
         kills += 1;
     }
     assert!(kills >= 2, "killed {kills} times");
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
     let check = cell.host_cal(&["log", "check", "session"]);
     assert_eq!(check.code, 0, "{}", check.transcript());
 }
@@ -271,7 +262,7 @@ fn a_controller_that_claims_to_be_there_is_not_believed() {
 
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 }
 
 #[test]
@@ -296,7 +287,7 @@ fn a_move_that_faults_is_tried_again() {
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done, "{:?}", crew.told);
     assert_eq!(collected.summary.troubles.len(), 2, "{:?}", collected.summary.troubles);
     assert!(collected.summary.troubles[0].contains("*Envelope error*"));
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 }
 
 #[test]
@@ -319,7 +310,7 @@ fn a_row_that_the_controller_refuses_is_gone_around() {
     }
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 }
 
 #[test]
@@ -331,7 +322,7 @@ fn a_controller_that_is_gone_ends_the_run_and_another_goes_on() {
     assert!(matches!(collected.ended, Err(CollectError::Robot(LinkError::Lost { .. }))), "{:?}", collected.ended);
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 }
 
 #[test]
@@ -342,7 +333,7 @@ fn a_bar_that_comes_off_stops_the_robot_and_is_attached_again() {
     let collected = cell.collect_with("session", Some(&mut link), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done, "{:?}", crew.told);
     assert!(collected.summary.troubles.iter().any(|words| words.contains("the bar came off")));
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 
     let mut link = Flawed::new(&cell, Flaw::DropsBar, 7, 1000);
     let collected = cell.collect_with("other", Some(&mut link), &mut crew, quick());
@@ -356,7 +347,7 @@ fn a_bar_that_is_attached_elsewhere_is_noticed() {
     let collected = cell.collect_with("session", Some(&mut cell.link()), &mut crew, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
     assert!(collected.summary.troubles[0].contains("A:1 with the 460 mm bar"), "{:?}", collected.summary.troubles);
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 
     let cell = self::cell();
     let mut crew = Crew { wrong: 3, ..Crew::new(&cell) };
@@ -450,7 +441,7 @@ fn a_robot_that_is_driven_by_hand_is_followed() {
     let mut pendant = Pendant { driver: &mut drive, is_done: false };
     let collected = cell.collect_with("session", None, &mut pendant, quick());
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Done);
-    assert_all_measured(&cell, "session");
+    cell.assert_all_measured("session");
 }
 
 #[test]
