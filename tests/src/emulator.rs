@@ -17,7 +17,7 @@ mod record;
 use std::path::Path;
 use std::time::Duration;
 
-use host_cal::virtual_board::{Plant, Script};
+use host_cal::virtual_board::{Driven, Plant, Script};
 use tempfile::TempDir;
 
 use crate::bridge::Bridge;
@@ -43,10 +43,15 @@ const LIMIT: Duration = Duration::from_secs(20);
 impl EmulatedBoard {
     /// Powers a board up, with nothing in its flash.
     pub fn start(plant: Plant) -> Self {
+        Self::start_driven(plant, None)
+    }
+
+    /// The same with somebody who drives the robot.
+    pub fn start_driven(plant: Plant, driven: Option<Driven>) -> Self {
         let folder = tempfile::tempdir().expect("a folder for sockets");
         let qemu = Qemu::start(Image::An386.elf(), folder.path(), &[]);
         let bridge = Bridge::start(qemu.connect("link"));
-        let plant = PlantServer::start(qemu.connect("plant"), plant, bridge.watcher());
+        let plant = PlantServer::start(qemu.connect("plant"), plant, driven, bridge.watcher());
         qemu.go();
         Self { plant, bridge, qemu, _folder: folder }
     }

@@ -30,6 +30,11 @@ pub const RIG: &str = "triangles";
 /// Travel of the LVDT, metres.
 pub const TRAVEL_M: f64 = 0.075;
 
+/// The link to the board's port, in the cell's folder.
+const PORT: &str = "port";
+/// A quick robot, whose arm counts as standing after a fifth of a second.
+const QUICK: [&str; 6] = ["--speed-deg-s", "90", "--rate", "200", "--hold-ms", "200"];
+
 /// A short plan: three pairings, eight poses each, one bar. Its text.
 pub static SHORT_PLAN: LazyLock<String> = LazyLock::new(|| plan_text(8, &[0.46], &[(0, 0), (1, 1), (2, 2)]));
 
@@ -61,17 +66,22 @@ pub fn rig() -> Rig {
     Rig::open(RIG).expect("a built-in rig")
 }
 
+/// The robot as it is.
+pub fn truth() -> Robot {
+    Robot::open(TRUTH).expect("a built-in robot")
+}
+
 /// A plant of the true robot.
 pub fn plant(seed: u64) -> Plant {
-    Plant::new(&Robot::open(TRUTH).expect("a built-in robot"), TRAVEL_M, seed).expect("its encoders are known")
+    Plant::new(&truth(), TRAVEL_M, seed).expect("its encoders are known")
 }
 
 /// A board that is ready, with the robot's controller.
-pub struct SimulatedCell {
-    /// Holds the sessions.
+pub struct SimulatedCell<Board = VirtualBoard> {
+    /// Holds the sessions, and the link `port` to the board's.
     pub folder: TempDir,
     /// The board.
-    pub board: VirtualBoard,
+    pub board: Board,
     /// The controller's address.
     pub address: String,
     /// The plan.
@@ -81,8 +91,13 @@ pub struct SimulatedCell {
 impl SimulatedCell {
     /// With a plant, the play of the bar's ends (standard deviation, metres), and a plan's text.
     pub fn start(plant: Plant, sigma_m: f64, plan: &str) -> Self {
+        Self::with_controller(plant, ControllerOptions { sigma_m, ..controller() }, plan)
+    }
+
+    /// With a plant, a controller for it, and a plan's text.
+    pub fn with_controller(plant: Plant, controller: ControllerOptions, plan: &str) -> Self {
         let (driver, driven) = driver();
-        let address = listen(driver, sigma_m);
+        let address = listen(driver, controller);
         Self::with_address(plant, Some(driven), address, plan)
     }
 
@@ -92,13 +107,21 @@ impl SimulatedCell {
     }
 
     fn with_address(plant: Plant, driven: Option<Driven>, address: String, plan: &str) -> Self {
-        let folder = TempDir::new().expect("a temporary folder");
-        std::fs::write(folder.path().join("plan.csv"), plan).expect("the plan can be written");
+        let folder = folder_with(plan);
         let parameters = Some(parameter_set(&design(), plant.lvdt()).expect("the robot fits a board"));
-        let port_name = Some(folder.path().join("port"));
+        let port_name = Some(folder.path().join(PORT));
         let options =
             VirtualBoardOptions { parameters, is_homed: true, driven, port_name, ..VirtualBoardOptions::new(plant, Pace::Free) };
         let board = VirtualBoard::start(options).expect("the board starts");
+        Self { folder, board, address, plan: plan.to_owned() }
+    }
+}
+
+impl<Board> SimulatedCell<Board> {
+    /// Around a board at a port, whose robot the controller at an address moves.
+    pub fn around(board: Board, port: &str, address: String, plan: &str) -> Self {
+        let folder = folder_with(plan);
+        std::os::unix::fs::symlink(port, folder.path().join(PORT)).expect("a link can be made");
         Self { folder, board, address, plan: plan.to_owned() }
     }
 
@@ -107,12 +130,15 @@ impl SimulatedCell {
         self.folder.path().join(name)
     }
 
-    /// Arguments of `host-cal collect` into a session.
+    /// Arguments of `host-cal collect` into a session, with a quick robot.
     pub fn collect_args(&self, session: &str) -> Vec<String> {
-        let words = ["collect", "port", "--session", session, "--plan", "plan.csv", "--robot", DESIGN, "--rig", RIG];
-        let link = ["--robot-link", "sim", "--robot-address", &self.address, "--speed-deg-s", "90"];
-        let quick = ["--rate", "200", "--hold-ms", "200"];
-        [&words[..], &link, &quick].concat().into_iter().map(str::to_owned).collect()
+        self.collect_args_with(session, &QUICK)
+    }
+
+    fn collect_args_with(&self, session: &str, more: &[&str]) -> Vec<String> {
+        let words = ["collect", PORT, "--session", session, "--plan", "plan.csv", "--robot", DESIGN, "--rig", RIG];
+        let link = ["--robot-link", "sim", "--robot-address", &self.address];
+        [&words[..], &link, more].concat().into_iter().map(str::to_owned).collect()
     }
 
     /// Runs `host-cal` in the folder.
@@ -120,10 +146,15 @@ impl SimulatedCell {
         host_cal_in(self.folder.path(), args)
     }
 
-    /// Runs `host-cal collect`.
+    /// Runs `host-cal collect` with a quick robot.
     pub fn collect(&self, session: &str, more: &[&str]) -> CommandRun {
-        let args = self.collect_args(session);
-        self.host_cal(&args.iter().map(String::as_str).chain(more.iter().copied()).collect::<Vec<_>>())
+        self.collect_as(session, &[&QUICK, more].concat())
+    }
+
+    /// Runs `host-cal collect` with these arguments beside those that say what and where.
+    pub fn collect_as(&self, session: &str, more: &[&str]) -> CommandRun {
+        let args = self.collect_args_with(session, more);
+        self.host_cal(&args.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
     /// The simulated robot's link.
@@ -144,7 +175,7 @@ impl SimulatedCell {
         operator: &mut dyn Operator,
         options: CollectOptions,
     ) -> Collected {
-        self.collect_at(self.board.port(), session, link, operator, options)
+        self.collect_at(&self.path(PORT).display().to_string(), session, link, operator, options)
     }
 
     /// As [`SimulatedCell::collect_with`], with the board at another port.
@@ -178,16 +209,35 @@ impl SimulatedCell {
         Collected { ended, summary, states, rows }
     }
 
+    /// Every row of the plan that is to be measured is in the session once.
+    pub fn assert_all_measured(&self, session: &str) {
+        let mut lines: Vec<usize> =
+            column(&self.path(session), "plan_row").iter().map(|line| line.parse().expect("a line of the plan")).collect();
+        lines.sort_unstable();
+        let rows = self.plan.lines().enumerate();
+        let expected: Vec<usize> = rows.filter(|(_, line)| line.starts_with("measure")).map(|(i, _)| i + 1).collect();
+        assert_eq!(lines, expected);
+    }
+
     /// The plan's rows.
     pub fn rows(&self) -> Vec<PlanRow> {
         read_plan(&Source::new("plan.csv", &self.plan), &design(), &rig()).expect("a sound plan")
     }
 }
 
+fn folder_with(plan: &str) -> TempDir {
+    let folder = TempDir::new().expect("a temporary folder");
+    std::fs::write(folder.path().join("plan.csv"), plan).expect("the plan can be written");
+    folder
+}
+
+/// The true robot's controller, without noise of its own.
+pub fn controller() -> ControllerOptions {
+    ControllerOptions::new(&truth(), &rig())
+}
+
 /// A controller that listens; its address.
-pub fn listen(driver: Driver, sigma_m: f64) -> String {
-    let truth = Robot::open(TRUTH).expect("a built-in robot");
-    let options = ControllerOptions { sigma_m, ..ControllerOptions::new(&truth, &rig()) };
+pub fn listen(driver: Driver, options: ControllerOptions) -> String {
     let controller = Controller::listen("127.0.0.1:0", driver, options).expect("a free port");
     controller.address().to_string()
 }

@@ -158,6 +158,22 @@ fn fit_writes_a_robot_that_keeps_the_comments_and_that_every_command_reads() {
 }
 
 #[test]
+fn poses_held_out_of_a_fit_prove_it() {
+    let folder = TempDir::new().expect("a temporary folder");
+    simulate(&folder, "both.csv", &["--bar", "460,610", "--per-pair", "10", "--sigma-mm", "0.084", "--seed", "7"]);
+    let fit = [&["fit"], &DESIGN[..], &["both.csv", "--hold-out"]].concat();
+    let by_bar = [&fit[..], &["bar=610", "--out", "calibrated.toml"]].concat();
+    snapshot("fit_held_out", &by_bar, headline(&runs(&folder, &[&by_bar])));
+    let validate = ["validate", "--robot", "calibrated.toml", "--rig", "triangles", "both.csv", "--hold-out", "bar=610"];
+    let run = shows(&folder, "validate_held_out", &validate);
+    // The set that `simulate` names after a bar has the same poses.
+    let by_set = runs(&folder, &[&validate[..7], &["set=610"]]).stdout;
+    assert_eq!(by_set.replace("set=610", "bar=610"), run.stdout);
+    let by_pairing = [&fit[..], &["set=610,pairing=A:1"]].concat();
+    snapshot("fit_held_out_by_two_rules", &by_pairing, headline(&runs(&folder, &[&by_pairing])));
+}
+
+#[test]
 fn a_fit_that_predicts_poses_left_out_worse_than_the_design_is_not_written() {
     let folder = TempDir::new().expect("a temporary folder");
     // The design's own lengths with much noise: whatever a fit changes is wrong.

@@ -3,10 +3,13 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use ballbar::Kinematics;
 use ballbar_firmware::ENCODERS;
 use ballbar_tests::emulator::{EmulatedBoard, is_skipped};
 use ballbar_tests::scenarios::{self, Bench, host_cal, host_cal_run};
-use host_cal::virtual_board::{Plant, Script};
+use ballbar_tests::simulated_cell::{self, DESIGN, SHORT_PLAN, SimulatedCell};
+use host_cal::files::Dataset;
+use host_cal::virtual_board::{Driven, Plant, Script, driver};
 use serde_json::Value;
 
 /// A board, and the turn to have one: two that run at once on a machine of two cores take longer than one after the other.
@@ -24,6 +27,11 @@ impl Bench for Emulated {
 
 /// A board that was just switched on, and a plant as the robot stands at that moment; none when boards are to be skipped.
 fn power_up(seed: u64) -> Option<(Emulated, Plant)> {
+    power_up_driven(seed, None)
+}
+
+/// The same with somebody who drives the robot.
+fn power_up_driven(seed: u64, driven: Option<Driven>) -> Option<(Emulated, Plant)> {
     static TURN: Mutex<()> = Mutex::new(());
     if is_skipped() {
         return None;
@@ -31,7 +39,7 @@ fn power_up(seed: u64) -> Option<(Emulated, Plant)> {
     // A test that failed was the last user of its board all the same.
     let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let plant = scenarios::plant(seed);
-    Some((Emulated(EmulatedBoard::start(plant.clone()), turn), plant))
+    Some((Emulated(EmulatedBoard::start_driven(plant.clone(), driven), turn), plant))
 }
 
 /// One board through its life: greeted, given parameters, reset, streaming a minute at 1 kHz, streaming over a bad line, and led
@@ -162,4 +170,36 @@ fn ten_minutes_leave_the_board_as_it_was() {
     assert_eq!(index_errors(&late), vec![Value::from(0); ENCODERS]);
     assert_eq!(bench.0.own_resets(), 0);
     assert_eq!(host_cal(&bench, "pose", &[])["homed"], true);
+}
+
+/// A plan is walked with the board's own image watching the robot: every row once, nothing lost, and each length is the true one at
+/// the joint values beside it.
+#[test]
+fn a_plan_is_collected() {
+    /// Two steps of the LVDT's code, and what is left of the arm's ringing.
+    const WITHIN_M: f64 = 3e-6;
+    let (driver, driven) = driver();
+    let Some((bench, plant)) = power_up_driven(4, Some(driven)) else { return };
+    scenarios::make_ready(&bench, &plant);
+    host_cal(&bench, "apply", &["--robot", DESIGN, "--uncalibrated"]);
+    let address = simulated_cell::listen(driver, simulated_cell::controller());
+    let port = bench.port();
+    let cell = SimulatedCell::around(bench, &port, address, &SHORT_PLAN);
+
+    let still = ["--band-counts", "1", "--band-codes", "24"];
+    let run = cell.collect_as("session", &[&["--speed-deg-s", "90", "--rate", "200", "--json"][..], &still].concat());
+    assert_eq!(run.code, 0, "{}", run.transcript());
+    let report = run.json();
+    assert_eq!((&report["measured"], &report["troubles"]), (&24.into(), &serde_json::json!([])));
+    assert_eq!((&report["losses"]["missing"], &report["losses"]["overruns"]), (&0.into(), &0.into()));
+    cell.assert_all_measured("session");
+
+    let (truth, rig) = (simulated_cell::truth(), simulated_cell::rig());
+    let kinematics = Kinematics::new(&truth.chain);
+    let poses = Dataset::read([cell.path("session/poses.csv").as_path()], &truth, &rig).unwrap();
+    let off_m = |m: ballbar::Measurement<f64>| (m.length_m - kinematics.length(&m.q, &m.pairing)).abs();
+    let largest_m = poses.measurements().into_iter().map(off_m).fold(0.0, f64::max);
+    println!("largest error of a length: {:.2} µm", largest_m * 1e6);
+    assert!(largest_m < WITHIN_M, "{largest_m}");
+    assert_eq!(cell.board.0.own_resets(), 0);
 }

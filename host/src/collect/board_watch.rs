@@ -44,6 +44,7 @@ pub struct BoardWatch {
     robot: RobotOnBoard,
     recorder: Recorder,
     criteria: StillnessCriteria,
+    period_us: u64,
     tally: StreamTally,
     view: Option<View>,
     stand: Option<Stand>,
@@ -75,8 +76,9 @@ impl BoardWatch {
         link.act(Command::SetStillness(criteria))?;
         link.start_stream(StreamSelection { samples: true, settled: true, poses: false })?;
         let tally = StreamTally::default();
-        let heard = Instant::now();
-        Ok(Self { link, robot, recorder, criteria, tally, view: None, stand: None, track: None, is_watchful: false, heard })
+        let (heard, period_us) = (Instant::now(), 1_000_000 / u64::from(rate_hz.max(1)));
+        let (view, stand, track, is_watchful) = (None, None, None, false);
+        Ok(Self { link, robot, recorder, criteria, period_us, tally, view, stand, track, is_watchful, heard })
     }
 
     /// The parameters that the board uses.
@@ -170,14 +172,15 @@ impl BoardWatch {
         Ok(now_us)
     }
 
-    /// The first sample after a time of the board's.
+    /// The first sample that was surely latched after the board told this time: it tells that of the latest sample it has taken up,
+    /// and the one behind it is latched already.
     ///
     /// # Errors
     /// As [`BoardWatch::listen`].
     pub fn view_after(&mut self, t_us: u64) -> Result<View, CollectError> {
         let began = Instant::now();
         loop {
-            if let Some(view) = self.view.filter(|view| view.t_us > t_us) {
+            if let Some(view) = self.view.filter(|view| view.t_us > t_us + 2 * self.period_us) {
                 return Ok(view);
             }
             if began.elapsed() > SILENCE {

@@ -386,8 +386,9 @@ impl<'a, 'o> Collector<'a, 'o> {
         }
         let encoders = board.set().encoders.iter().zip(&robot.encoders).enumerate();
         for (i, (on_board, facts)) in encoders {
-            if let Some(encoder) = facts.encoder.filter(|encoder| encoder.counts_per_unit as f32 != on_board.counts_per_unit) {
-                let (found, expected) = (on_board.counts_per_unit, encoder.counts_per_unit);
+            let expected = facts.encoder.map(|encoder| encoder.counts_per_unit as f32);
+            let found = on_board.counts_per_unit;
+            if let Some(expected) = expected.filter(|&expected| expected != found) {
                 return other(format!("joint {} has {found} counts a radian or metre, in the plan's robot {expected}", i + 1));
             }
         }

@@ -14,8 +14,8 @@ use embedded_io::{Read, ReadReady, Write, WriteReady};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::counters::COUNTER_WIDTHS;
 use super::flash_file::FlashFile;
-use super::plant::COUNTER_WIDTHS;
 
 /// The encoders' inputs, set before every tick.
 #[derive(Default)]

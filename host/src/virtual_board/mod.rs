@@ -8,6 +8,7 @@
 //! The robot, the bar and the wiring are simulated; all that the host talks to is the code that runs on a board.
 
 mod controller;
+mod counters;
 mod driver;
 mod flash_file;
 mod lvdt;
@@ -41,9 +42,10 @@ use pty::Pty;
 use runner::{Runner, Shared};
 
 pub use controller::{Controller, ControllerOptions};
+pub use counters::COUNTER_WIDTHS;
 pub use driver::{Driven, Driver, Order, Stance, driver};
 pub use lvdt::lvdt_curve;
-pub use plant::{COUNTER_WIDTHS, Plant, PlantError, PlantState};
+pub use plant::{Plant, PlantError, PlantState};
 pub use script::{AttachedBar, Script, Station};
 
 /// What a virtual board is made of.

@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use ballbar::{CounterWidth, JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve};
+use ballbar::{JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve};
 use ballbar_firmware::{ENCODERS, EncoderLatch, LvdtScan};
 use miette::Diagnostic;
 use rand::SeedableRng;
@@ -15,20 +15,13 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use thiserror::Error;
 
+use super::counters::{counter, last_index};
 use super::lvdt::{code_at, lvdt_curve};
 use super::motion::{Held, Moment, Move, Rest, us_from_s};
 use super::play::{Backlash, Lag};
 use super::script::{AttachedBar, Script, Station, move_duration_s};
 use crate::files::{NoEncoders, Robot};
 use crate::robot_link::JointSpeed;
-
-/// Widths of the counters: a PUMA's joints 4 and 6 span more than 16 bits and have the 32-bit ones, as on the real board.
-pub const COUNTER_WIDTHS: [CounterWidth; ENCODERS] = {
-    let mut widths = [CounterWidth::Bits16; ENCODERS];
-    widths[3] = CounterWidth::Bits32;
-    widths[5] = CounterWidth::Bits32;
-    widths
-};
 
 /// Noise of the LVDT's oversampled code, standard deviation, codes.
 const CODE_NOISE: f64 = 1.5;
@@ -263,33 +256,14 @@ impl Plant {
     }
 }
 
-/// The hardware counter of encoder `i` at a position in counts.
-fn counter(i: usize, counts: i32, start_counts: i32) -> u32 {
-    let since_start = counts.wrapping_sub(start_counts) as u32;
-    match COUNTER_WIDTHS[i] {
-        CounterWidth::Bits16 => since_start & 0xffff,
-        CounterWidth::Bits32 => since_start,
-    }
-}
-
-/// The last index that was crossed between two positions; indices stand at the whole multiples of `per_index`.
-fn last_index(before: i32, now: i32, per_index: u32) -> Option<i32> {
-    let per_index = i32::try_from(per_index).ok().filter(|&per_index| per_index > 0)?;
-    let (turn_before, turn) = (before.div_euclid(per_index), now.div_euclid(per_index));
-    match turn.cmp(&turn_before) {
-        std::cmp::Ordering::Equal => None,
-        std::cmp::Ordering::Greater => Some(turn.wrapping_mul(per_index)),
-        std::cmp::Ordering::Less => Some((turn + 1).wrapping_mul(per_index)),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use ballbar::{ExtendedCounter, Pairing, Vector3};
+    use ballbar::{CounterWidth, ExtendedCounter, Pairing, Vector3};
 
     use super::*;
     use crate::files::Rig;
     use crate::simulate::Shells;
+    use crate::virtual_board::counters::COUNTER_WIDTHS;
 
     const TRAVEL_M: f64 = 0.075;
 

@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use ballbar_firmware::{ENCODERS, LvdtScan};
-use host_cal::virtual_board::{Plant, Script};
+use host_cal::virtual_board::{Driven, Plant, Script};
 
 use super::record::RecordWriter;
 use crate::bridge::LineWatcher;
@@ -57,12 +57,12 @@ const NONSENSE: [u8; 2] = [0x80, 0x80];
 const LOOK: Duration = Duration::from_millis(100);
 
 impl PlantServer {
-    pub(super) fn start(socket: UnixStream, plant: Plant, line: LineWatcher) -> Self {
+    pub(super) fn start(socket: UnixStream, plant: Plant, driven: Option<Driven>, line: LineWatcher) -> Self {
         socket.set_read_timeout(Some(LOOK)).expect("a socket takes a time limit");
         let desk = Desk { plant, waiting: None, answers_nonsense: false, starts: 0, ticks: Vec::new() };
         let shared = Arc::new(Shared { desk: Mutex::new(desk), is_stopped: AtomicBool::new(false) });
-        let server =
-            Server { socket, shared: Arc::clone(&shared), line, writer: RecordWriter::default(), now_us: 0, started_us: 0 };
+        let (shared_too, writer) = (Arc::clone(&shared), RecordWriter::default());
+        let server = Server { socket, shared: shared_too, line, driven, writer, now_us: 0, started_us: 0 };
         Self { shared, thread: Some(std::thread::spawn(move || server.serve())) }
     }
 
@@ -100,6 +100,8 @@ struct Server {
     socket: UnixStream,
     shared: Arc<Shared>,
     line: LineWatcher,
+    /// Who drives the robot besides the scripts.
+    driven: Option<Driven>,
     writer: RecordWriter,
     /// The plant's time.
     now_us: u64,
@@ -151,6 +153,9 @@ impl Server {
         }
         self.now_us += us;
         desk.begin_script(self.line.streamed());
+        if let Some(driven) = &self.driven {
+            driven.attend(&mut desk.plant);
+        }
         let state = desk.plant.at(self.now_us);
         let tick = Tick { t_us: self.now_us - self.started_us, counts: desk.plant.counts(), scan: state.scan };
         desk.ticks.push(tick);

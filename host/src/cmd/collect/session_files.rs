@@ -71,8 +71,13 @@ fn choose(
     builtins: &[(&str, &str)],
     new: &mut Vec<(PathBuf, Source)>,
 ) -> Result<Source, CommandError> {
+    let what = name.trim_end_matches(".toml");
     let kept_path = session.join(name);
-    let given_source = given.map(|given| Source::named_or_read(given, builtins, flag.trim_start_matches('-'))).transpose()?;
+    let read = |given| match builtins {
+        [] => Source::read(Path::new(given)),
+        _ => Source::named_or_read(given, builtins, what),
+    };
+    let given_source = given.map(read).transpose()?;
     let kept = if kept_path.is_file() { Some(Source::read(&kept_path)?) } else { None };
     match (given_source, kept) {
         (Some(given_source), Some(kept)) if given_source.text() != kept.text() => {
