@@ -86,7 +86,7 @@ pub struct Collector<'a, 'o> {
     pub(super) summary: Summary,
     /// How the arm stood when rows were measured in this run.
     pub(super) stands: HashMap<usize, Stand>,
-    missed_in_a_row: usize,
+    pub(super) missed_in_a_row: usize,
     began: Instant,
     told: Instant,
 }

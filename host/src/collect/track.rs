@@ -115,6 +115,7 @@ impl Collector<'_, '_> {
             return Ok(());
         }
         self.ledger.set(row, RowState::Measured);
+        self.missed_in_a_row = 0;
         let measured = Measured {
             line: planned.line,
             done: self.ledger.count(&RowState::Measured),
