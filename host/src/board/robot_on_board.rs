@@ -1,6 +1,6 @@
 //! A robot's file as the board's parameters, and the board's parameters as something to compute with in f64.
 
-use ballbar::wire::{Answer, Command, ParameterSet, Refusal, WhichSet};
+use ballbar::wire::{Answer, Command, ParameterSet, Refusal, Status, WhichSet};
 use ballbar::{Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose};
 use miette::Diagnostic;
 use thiserror::Error;
@@ -137,6 +137,12 @@ impl RobotOnBoard {
     /// The map between counts and joint values.
     pub fn encoders(&self) -> &JointEncoders<f64> {
         &self.encoders
+    }
+
+    /// Whether by this status they were.
+    pub fn is_homed_by(&self, status: &Status) -> bool {
+        let homed = status.encoders.iter().enumerate().map(|(i, encoder)| u8::from(encoder.is_homed) << i);
+        self.is_homed(homed.sum())
     }
 
     /// Joint values q, radians or metres, at encoder positions in counts.

@@ -9,6 +9,7 @@ mod session_files;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use ballbar::wire::{Answer, Command};
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
@@ -20,7 +21,9 @@ use super::port::{EndRequest, PortArgs, StillnessArgs};
 use super::report::print;
 use super::stream::record_error;
 use crate::board::{BoardLink, RobotOnBoard};
-use crate::collect::{BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, remove_lag};
+use crate::collect::{
+    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, check_board, remove_lag,
+};
 use crate::files::PlanRow;
 use crate::plan::{Cell, Margins, Pace, check};
 use crate::robot_link::JointSpeed;
@@ -159,6 +162,9 @@ impl CollectArgs {
         }
         let mut link = self.port.connect()?;
         let robot = RobotOnBoard::read(&mut link)?.ok_or(ArgumentError::NoParameters)?;
+        if let Answer::Status(status) = link.request(Command::Status)? {
+            check_board(&files.robot, &robot.0, robot.0.is_homed_by(&status))?;
+        }
         files.write()?;
         let guide = self.guide(&mover, &files, &options)?;
         let recorder = self.recorder(&link, &robot, &mover)?;

@@ -300,7 +300,7 @@ fn pairing_changes(rig: &Rig, fit: &Fit) -> Vec<PairingChange> {
 
 fn outlier_lines(dataset: &Dataset, fit: &Fit) -> Vec<OutlierLine> {
     let line = |outlier: &crate::identify::Outlier| OutlierLine {
-        row: outlier.row + 1,
+        row: dataset.rows[outlier.row].number,
         place: dataset.place(outlier.row),
         residual_mm: mm_from_m(fit.residuals[outlier.row].value_m),
         score: outlier.score,

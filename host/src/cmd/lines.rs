@@ -47,7 +47,7 @@ pub(super) fn largest(dataset: &Dataset, rig: &Rig, residuals: &[Residual], coun
     let size = |row: usize| residuals[row].value_m.abs();
     order.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
     let line = |&row: &usize| ResidualLine {
-        row: row + 1,
+        row: dataset.rows[row].number,
         place: dataset.place(row),
         pairing: rig.pairing_name(dataset.rows[row].pairing),
         residual_mm: mm_from_m(residuals[row].value_m),

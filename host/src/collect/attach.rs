@@ -58,7 +58,7 @@ impl Collector<'_, '_> {
                 return Ok(true);
             }
             let confirmed_us = self.board.ask()?.t_us;
-            let now_m = self.board.view_after(confirmed_us)?.displacement_m;
+            let now_m = self.board.view_after(confirmed_us + STEADY_US)?.displacement_m;
             let is_as_before = before_m.zip(now_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() < STILL_ON_M);
             // Of a bar of which nothing is known, a length that stays may be that of one that hangs free.
             if !is_as_before || connection.is_none() {

@@ -149,13 +149,12 @@ impl BoardWatch {
         let Answer::Status(status) = self.link.request(Command::Status)? else {
             return Err(BoardError::WrongAnswer { command: "status" }.into());
         };
-        let homed = status.encoders.iter().enumerate().map(|(i, encoder)| u8::from(encoder.is_homed) << i);
         let displacement_m = self.robot.displacement_m(status.lvdt);
         Ok(View {
             t_us: status.uptime_us,
             q: self.robot.q(status.encoders.iter().map(|encoder| f64::from(encoder.counts))),
             displacement_m,
-            is_homed: self.robot.is_homed(homed.sum()),
+            is_homed: self.robot.is_homed_by(&status),
             off_since_us: displacement_m.is_none().then_some(status.uptime_us),
         })
     }

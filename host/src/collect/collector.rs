@@ -7,6 +7,7 @@ use ballbar::JointVector;
 
 use super::Nearness;
 use super::board_watch::{BoardWatch, Stand};
+use super::check_board::check_board;
 use super::drive::Drive;
 use super::errors::CollectError;
 use super::follow::Guide;
@@ -342,10 +343,11 @@ impl<'a, 'o> Collector<'a, 'o> {
     /// Gives a row up for this run.
     pub(super) fn miss(&mut self, row: usize, why: &str) -> Result<(), CollectError> {
         let line = self.ledger.rows()[row].line;
-        if *self.ledger.state(row) == RowState::Todo {
-            self.ledger.set(row, RowState::Missed(why.to_owned()));
-            self.operator.tell(&Event::Missed { line, why })?;
+        if *self.ledger.state(row) != RowState::Todo {
+            return Ok(());
         }
+        self.ledger.set(row, RowState::Missed(why.to_owned()));
+        self.operator.tell(&Event::Missed { line, why })?;
         self.missed_in_a_row += 1;
         if self.missed_in_a_row >= MISSED_IN_A_ROW {
             return Err(CollectError::TooManyMissed { count: self.missed_in_a_row, line, why: why.to_owned() });
@@ -374,34 +376,7 @@ impl<'a, 'o> Collector<'a, 'o> {
 
     /// The board's robot is the plan's, and knows where it is.
     fn check_board(&mut self) -> Result<(), CollectError> {
-        let (board, robot) = (self.board.robot(), self.cell.robot);
-        let other = |what: String| Err(CollectError::OtherRobot { what });
-        let (found, expected) = (board.kinds(), robot.chain.joint_kinds());
-        if found != expected {
-            return other(format!(
-                "{} joints {found:?}, the plan's robot has {} joints {expected:?}",
-                found.len(),
-                expected.len()
-            ));
-        }
-        let encoders = board.set().encoders.iter().zip(&robot.encoders).enumerate();
-        for (i, (on_board, facts)) in encoders {
-            let expected = facts.encoder.map(|encoder| encoder.counts_per_unit as f32);
-            let found = on_board.counts_per_unit;
-            if let Some(expected) = expected.filter(|&expected| expected != found) {
-                return other(format!("joint {} has {found} counts a radian or metre, in the plan's robot {expected}", i + 1));
-            }
-        }
-        let couplings: Vec<_> = robot.encoders.iter().flat_map(|facts| &facts.couplings).collect();
-        let is_same = |(a, b): (&ballbar::Coupling<f32>, &&ballbar::Coupling<f64>)| {
-            (a.joint, a.driven_by, a.ratio) == (b.joint, b.driven_by, b.ratio as f32)
-        };
-        if board.set().couplings.len() != couplings.len() || !board.set().couplings.iter().zip(&couplings).all(is_same) {
-            return other("its couplings between joints are others".into());
-        }
-        if !self.board.view()?.is_homed {
-            return Err(CollectError::NotHomed);
-        }
-        Ok(())
+        let is_homed = self.board.view()?.is_homed;
+        check_board(self.cell.robot, self.board.robot(), is_homed)
     }
 }

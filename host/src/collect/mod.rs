@@ -12,6 +12,7 @@
 
 mod attach;
 mod board_watch;
+mod check_board;
 mod collector;
 mod drive;
 mod errors;
@@ -24,6 +25,7 @@ mod repeat;
 mod track;
 
 pub use board_watch::{BoardWatch, Stand, View};
+pub use check_board::check_board;
 pub use collector::{CollectOptions, Collector, Ended, Summary};
 pub use errors::CollectError;
 pub use follow::{Guide, ShellPrograms};

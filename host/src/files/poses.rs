@@ -30,6 +30,8 @@ pub struct PoseRow {
     pub file: usize,
     /// Line in that file, from 1.
     pub line: usize,
+    /// Number over all files, from 1, whatever is kept apart of them later.
+    pub number: usize,
 }
 
 /// How the length changed while it was measured.

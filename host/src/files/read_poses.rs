@@ -38,7 +38,11 @@ impl Dataset {
             return Err(InputError::of_file(source.name(), Problem::MixedSigma));
         }
         self.files.push(source.name().to_owned());
+        let before = self.rows.len();
         self.rows.extend(rows);
+        for (number, row) in (before + 1..).zip(&mut self.rows[before..]) {
+            row.number = number;
+        }
         self.set_weights();
         Ok(())
     }
@@ -117,6 +121,7 @@ fn read_row(rows: &CsvRows<'_>, columns: &Columns, record: &StringRecord, file: 
         motion: columns.motion.map_or(Ok(None), |(rate, lag)| read_motion(rows, record, rate, lag))?,
         file,
         line: rows.line(record),
+        number: 0,
     })
 }
 

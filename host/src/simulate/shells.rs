@@ -145,6 +145,7 @@ impl Shells<'_> {
                 motion: None,
                 file: 0,
                 line: 0,
+                number: 0,
             },
             latitude_rad,
             longitude_rad,

@@ -21,7 +21,7 @@ pub(super) struct SessionFiles {
 
 #[derive(Debug, Error, Diagnostic)]
 enum SessionFileError {
-    #[error("{flag} {given}: the session {} was begun with another one", session.display())]
+    #[error("{flag} {given}: the session `{}` was begun with another one", session.display())]
     #[diagnostic(help("Leave {flag} out to go on with {}, or record into another directory.", session.join(name).display()))]
     Other { flag: &'static str, given: String, session: PathBuf, name: &'static str },
     #[error("{flag} is missing, and {} holds no {name}", session.display())]
