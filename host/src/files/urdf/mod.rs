@@ -22,6 +22,9 @@ pub const ENCODER_ELEMENT: &str = "ballbar_encoder";
 /// Far more than the largest published descriptions have.
 const MOST_BYTES: u64 = 8 << 20;
 const MOST_NODES: u32 = 200_000;
+/// The parser compares every attribute of an element with all others, and carries every namespace on to all elements within.
+const MOST_ATTRIBUTES: usize = 200;
+const MOST_NAMESPACES: usize = 100;
 
 /// Names of the links that the chain begins and ends with; the root and the only end of the tree when not given.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,6 +61,7 @@ pub fn read_urdf(path: &Path, ends: UrdfEnds<'_>) -> Result<Imported, InputError
 }
 
 fn parse(source: &Source, ends: UrdfEnds<'_>) -> Result<Imported, InputError> {
+    check_is_bounded(source)?;
     let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(source.text(), options).map_err(|error| {
         let at = error.pos();
@@ -67,6 +71,20 @@ fn parse(source: &Source, ends: UrdfEnds<'_>) -> Result<Imported, InputError> {
     let robot = elements::read(source, &document)?;
     let path = tree::path(source, &robot, ends)?;
     chain::imported(source, &robot, &path)
+}
+
+/// Refuses what would take the parser more than a moment. No attribute holds a `<` and each has two quotes, so that the quotes up to the
+/// next `<` bound an element's attributes.
+fn check_is_bounded(source: &Source) -> Result<(), InputError> {
+    let refuse = |what: String| Err(InputError::of_file(source.name(), Problem::Xml(what)));
+    let quotes = |part: &str| part.bytes().filter(|byte| matches!(byte, b'"' | b'\'')).count();
+    if source.text().split('<').any(|part| quotes(part) > 2 * MOST_ATTRIBUTES) {
+        return refuse(format!("an element with more than {MOST_ATTRIBUTES} attributes"));
+    }
+    if source.text().matches("xmlns").count() > MOST_NAMESPACES {
+        return refuse(format!("more than {MOST_NAMESPACES} namespaces"));
+    }
+    Ok(())
 }
 
 /// The character at a row and column, both from 1.
