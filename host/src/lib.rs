@@ -8,6 +8,7 @@
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
+//! | [`export`] | a robot in the formats of others, one file each |
 //! | [`kinematics`] | where every link stands, and from tool poses back to joint vectors |
 //! | [`plan`] | which poses to measure, and the way between them |
 //! | [`simulate`] | poses on hemispherical shells, simulated lengths, tool error over the workspace |
@@ -21,6 +22,7 @@
 pub mod board;
 pub mod cmd;
 pub mod collect;
+pub mod export;
 pub mod files;
 pub mod identify;
 pub mod kinematics;

@@ -9,6 +9,7 @@ use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn};
 use crate::files::Robot;
+use crate::kinematics::link_angles;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 
 /// Pose of the tool at given joint values (forward kinematics)
@@ -61,11 +62,10 @@ impl FkArgs {
         let q = robot.chain.joint_vector(&q).map_err(|_| wrong_count)?;
         let base_from_tool = Kinematics::new(&robot.chain).base_from_tool(&q);
         let r = base_from_tool.rotation;
-        let angles = [r[(1, 0)].atan2(r[(0, 0)]), (-r[(2, 0)]).atan2(r[(2, 1)].hypot(r[(2, 2)])), r[(2, 1)].atan2(r[(2, 2)])];
         Ok(FkReport {
             position_mm: base_from_tool.translation_m.map(|m| positive_zero(mm_from_m(m))).into(),
             rotation: std::array::from_fn(|i| std::array::from_fn(|j| positive_zero(r[(i, j)]))),
-            alpha_beta_gamma_deg: angles.map(|angle| positive_zero(angle.to_degrees())),
+            alpha_beta_gamma_deg: link_angles(&r).map(|angle| positive_zero(angle.to_degrees())),
             warnings,
         })
     }

@@ -5,12 +5,15 @@
 
 mod apply;
 mod collect;
+mod compensate;
 #[cfg(unix)]
 mod demo;
+mod export;
 mod fit;
 mod fk;
 mod hold_out;
 mod home;
+mod import;
 mod inputs;
 mod lines;
 mod live_line;
@@ -58,6 +61,9 @@ enum Command {
     Validate(validate::ValidateArgs),
     Rank(rank::RankArgs),
     Fk(fk::FkArgs),
+    Export(export::ExportArgs),
+    Import(import::ImportArgs),
+    Compensate(compensate::CompensateArgs),
     Plan(plan::PlanArgs),
     Collect(collect::CollectArgs),
     Simulate(simulate::SimulateArgs),
@@ -87,6 +93,9 @@ impl Cli {
             Command::Validate(args) => args.run(),
             Command::Rank(args) => args.run(),
             Command::Fk(args) => args.run(),
+            Command::Export(args) => args.run(),
+            Command::Import(args) => args.run(),
+            Command::Compensate(args) => args.run(),
             Command::Plan(args) => args.run(),
             Command::Collect(args) => args.run(),
             Command::Simulate(args) => args.run(),

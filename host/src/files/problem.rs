@@ -199,6 +199,44 @@ pub enum Problem {
         /// The words.
         expected: &'static str,
     },
+    /// A file that is longer than any of its kind.
+    #[error("longer than {most_bytes} bytes")]
+    TooLong {
+        /// What is read at most.
+        most_bytes: u64,
+    },
+    /// Not XML, or XML with a document type, in the parser's words.
+    #[error("not XML that can be read: {0}")]
+    Xml(String),
+    /// An element or attribute of a robot description that is missing or cannot be what it is.
+    #[error("{what} is {found}, expected {expected}")]
+    Urdf {
+        /// The element or attribute, and of which joint.
+        what: String,
+        /// What stands there.
+        found: String,
+        /// What may stand there.
+        expected: &'static str,
+    },
+    /// Links and joints that are no tree.
+    #[error("{0}")]
+    UrdfTree(String),
+    /// A link that was asked for and is not there.
+    #[error("{what} `{found}` is no link of this robot")]
+    UrdfLink {
+        /// Which end was asked for: `--base` or `--tip`.
+        what: &'static str,
+        /// The name asked for.
+        found: String,
+        /// The names to choose from.
+        known: String,
+    },
+    /// A tree with several ends, any of which may be the tool.
+    #[error("the tree has several ends, and nothing says which one is the tool")]
+    UrdfEnds {
+        /// The names to choose from.
+        known: String,
+    },
     /// A plan's length is not that of this robot at this rig.
     #[error("the plan expects a length of {planned_mm:.3} mm, but this robot at this rig has {length_mm:.3} mm here")]
     PlanOfAnother {
@@ -241,6 +279,14 @@ impl Problem {
             Self::UnknownEnd { .. } => "Names are compared letter by letter; is this the rig that was measured with?",
             Self::NoPoses => "Was the recording stopped before the first pose settled?",
             Self::Word { .. } => return None,
+            Self::TooLong { .. } => "Robot descriptions are far shorter; is it the right file?",
+            Self::Xml(_) => {
+                "A URDF file is needed, without DOCTYPE and entities; expand a xacro file first: xacro robot.xacro > robot.urdf"
+            }
+            Self::Urdf { .. } => "See the URDF specification: a joint has a parent, a child, origin, axis and limit.",
+            Self::UrdfTree(_) => "The links and joints of a URDF are a tree: one root, and one joint above every other link.",
+            Self::UrdfLink { known, .. } => return Some(format!("Links: {known}.")),
+            Self::UrdfEnds { known } => return Some(format!("Name it: --tip LINK. Ends: {known}.")),
             Self::PlanOfAnother { .. } => {
                 "Was it planned for another robot, or has the robot's or the rig's file changed since? Plan again."
             }

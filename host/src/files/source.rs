@@ -1,5 +1,7 @@
 //! The text that a file or a built-in holds, and what is wrong at some place in it.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -30,6 +32,23 @@ impl Source {
         let name = path.display().to_string();
         let text =
             std::fs::read_to_string(path).map_err(|error| InputError::of_file(&name, Problem::Unreadable(error.to_string())))?;
+        Ok(Self::new(&name, &text))
+    }
+
+    /// Reads a file of at most so many bytes; a longer one is not read to its end.
+    ///
+    /// # Errors
+    /// As [`Source::read`], and [`Problem::TooLong`].
+    pub fn read_at_most(path: &Path, most_bytes: u64) -> Result<Self, InputError> {
+        let name = path.display().to_string();
+        let mut bytes = Vec::new();
+        let unreadable = |reason: String| InputError::of_file(&name, Problem::Unreadable(reason));
+        let read = File::open(path).and_then(|file| file.take(most_bytes + 1).read_to_end(&mut bytes));
+        read.map_err(|error| unreadable(error.to_string()))?;
+        if bytes.len() as u64 > most_bytes {
+            return Err(InputError::of_file(&name, Problem::TooLong { most_bytes }));
+        }
+        let text = String::from_utf8(bytes).map_err(|error| unreadable(error.to_string()))?;
         Ok(Self::new(&name, &text))
     }
 
@@ -83,14 +102,25 @@ impl InputError {
     /// A problem at some bytes of a text.
     pub(super) fn at(source: &Source, span: Range<usize>, problem: Problem) -> Self {
         let place = format!("{}:{}", source.name(), source.line_of(span.start));
-        let named = NamedSource::new(source.name(), source.text().to_owned());
-        Self { place, problem: Box::new(problem), at: Some(Box::new((named, span))) }
+        let show = || (NamedSource::new(source.name(), source.text().to_owned()), span.clone());
+        Self { place, problem: Box::new(problem), at: can_be_shown(source.text(), &span).then(|| Box::new(show())) }
     }
 
     /// What is wrong.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
+}
+
+/// Whether the lines around a span fit a screen: a file of one line a megabyte long is not to be printed.
+fn can_be_shown(text: &str, span: &Range<usize>) -> bool {
+    const LONGEST: usize = 2_000;
+    let bytes = text.as_bytes();
+    let before = bytes[..span.start.min(bytes.len())].iter().rev().take(LONGEST);
+    let lines_before = before.filter(|&&b| b == b'\n').count();
+    let after = bytes[span.start.min(bytes.len())..].iter().take(LONGEST);
+    let lines_after = after.filter(|&&b| b == b'\n').count();
+    (lines_before >= 2 || span.start < LONGEST) && (lines_after >= 2 || bytes.len() < span.start + LONGEST)
 }
 
 impl Diagnostic for InputError {

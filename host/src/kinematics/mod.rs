@@ -4,10 +4,16 @@
 //! all joints, for solids and for Jacobians with respect to `q`, and the way back from a pose to joint vectors.
 
 mod branches;
+mod compensation;
+mod dh;
+mod frames;
 mod inverse;
 mod opw;
 mod skeleton;
 
 pub use branches::{Branches, InverseKinematics, Thoroughness};
+pub use compensation::{Compensation, Compensator};
+pub use dh::{Convention, DhRow, DhTable, NearlyParallel};
+pub use frames::{apart, compose, from_link, inverse, link_angles};
 pub use opw::Opw;
 pub use skeleton::{Axis, Posture, Skeleton};

@@ -8,6 +8,7 @@ use rs_opw_kinematics::kinematic_traits::{Kinematics as _, Pose as OpwPose};
 use rs_opw_kinematics::kinematics_impl::OPWKinematics;
 use rs_opw_kinematics::parameters::opw_kinematics::Parameters;
 
+use super::frames::compose;
 use super::skeleton::{Axis, Skeleton};
 
 const JOINTS: usize = 6;
@@ -138,10 +139,6 @@ fn crossing(a: &Axis, b: &Axis) -> Option<Vector3<f64>> {
         return None;
     }
     Some(a.point_m + a.direction * (between_m.cross(&b.direction).dot(&normal) / normal.norm_squared()))
-}
-
-fn compose(a: &Pose<f64>, b: &Pose<f64>) -> Pose<f64> {
-    Pose { rotation: a.rotation * b.rotation, translation_m: a.rotation * b.translation_m + a.translation_m }
 }
 
 #[cfg(test)]

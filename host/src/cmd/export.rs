@@ -1,0 +1,85 @@
+//! `host-cal export`: a robot in the formats of others.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::inputs::OutputArgs;
+use super::outcome::{CommandError, Outcome};
+use super::report::{Report, print, warn, write_file};
+use crate::export::{Format, export};
+use crate::files::Robot;
+use crate::units::mm_from_m;
+
+/// Write a robot as URDF, DH table, data or source code
+#[derive(Args)]
+#[command(after_help = "Example:\n  host-cal export --robot calibrated.toml --format urdf --out calibrated.urdf")]
+pub(super) struct ExportArgs {
+    /// robot.toml, or a built-in: puma560, puma560-optimised, irb120, ur5e, stanford, scara
+    #[arg(long)]
+    robot: String,
+    /// What to write it as
+    #[arg(long, value_enum)]
+    format: Format,
+    /// File to write; printed when not given
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Serialize)]
+struct ExportReport {
+    robot: String,
+    calibrated: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    out: Option<PathBuf>,
+    /// The file, where it was not written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    text: Option<String>,
+    /// Of a format with another model than the robot's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    largest_difference_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    largest_difference_deg: Option<f64>,
+    warnings: Vec<String>,
+}
+
+impl ExportArgs {
+    pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        let robot = Robot::open(&self.robot)?;
+        let exported = export(&robot, self.format);
+        for remark in &exported.remarks {
+            warn(remark);
+        }
+        if let Some(path) = &self.out {
+            write_file(path, &exported.text)?;
+        }
+        let report = ExportReport {
+            robot: robot.name.clone(),
+            calibrated: robot.calibration.is_some(),
+            out: self.out.clone(),
+            text: self.out.is_none().then_some(exported.text),
+            largest_difference_mm: exported.largest_difference.map(|(off_m, _)| mm_from_m(off_m)),
+            largest_difference_deg: exported.largest_difference.map(|(_, turned_rad)| turned_rad.to_degrees()),
+            warnings: exported.remarks,
+        };
+        print(&report, self.output.json)?;
+        Ok(Outcome::Good)
+    }
+}
+
+impl Report for ExportReport {
+    fn text(&self) -> String {
+        if let Some(text) = &self.text {
+            return text.clone();
+        }
+        let out = self.out.as_ref().map_or_else(String::new, |path| path.display().to_string());
+        let mut text = format!("{} is written to {out}\n", self.robot);
+        if let (Some(mm), Some(deg)) = (self.largest_difference_mm, self.largest_difference_deg) {
+            text += &format!("largest difference to the robot over random joint vectors: {mm:.1e} mm, {deg:.1e} degrees\n");
+        }
+        text
+    }
+}

@@ -1,0 +1,116 @@
+//! JSON, YAML and CSV of a chain's parameters.
+
+use std::fmt::Write;
+
+use ballbar::{JointKind, Parameter};
+use serde::Serialize;
+
+use super::origin;
+use crate::files::Robot;
+use crate::units::ScreenUnit;
+
+/// A robot for JSON and YAML, metres and radians.
+#[derive(Serialize)]
+struct RobotData<'a> {
+    name: &'a str,
+    is_calibrated: bool,
+    model: &'static str,
+    links: Vec<LinkData>,
+    joints: Vec<JointData>,
+}
+
+#[derive(Serialize)]
+struct LinkData {
+    translation_m: [f64; 3],
+    alpha_rad: f64,
+    beta_rad: f64,
+    gamma_rad: f64,
+}
+
+#[derive(Serialize)]
+struct JointData {
+    #[serde(rename = "type")]
+    kind: &'static str,
+    /// Of offset and limits.
+    unit: &'static str,
+    offset: f64,
+    scale: f64,
+    min: f64,
+    max: f64,
+}
+
+const MODEL: &str = "link = Trans(x, y, z) Rz(alpha) Ry(beta) Rx(gamma); joint = Rz or Trans_z of offset + scale * encoder output; \
+                     tool in base = link 1, joint 1, ... joint J, link J+1";
+
+impl<'a> RobotData<'a> {
+    fn new(robot: &'a Robot) -> Self {
+        let chain = &robot.chain;
+        let link = |link: ballbar::Link<f64>| LinkData {
+            translation_m: link.translation_m.into(),
+            alpha_rad: link.alpha_rad,
+            beta_rad: link.beta_rad,
+            gamma_rad: link.gamma_rad,
+        };
+        let joints = (0..chain.joints()).filter_map(|i| chain.joint(i)).zip(&robot.limits);
+        let joint = |(joint, limits): (ballbar::Joint<f64>, &crate::files::JointLimits)| {
+            let (kind, unit) = match joint.kind {
+                JointKind::Revolute => ("revolute", "rad"),
+                JointKind::Prismatic => ("prismatic", "m"),
+            };
+            JointData { kind, unit, offset: joint.offset, scale: joint.scale, min: limits.min, max: limits.max }
+        };
+        Self {
+            name: &robot.name,
+            is_calibrated: robot.calibration.is_some(),
+            model: MODEL,
+            links: (0..=chain.joints()).filter_map(|i| chain.link(i)).map(link).collect(),
+            joints: joints.map(joint).collect(),
+        }
+    }
+}
+
+pub(super) fn json(robot: &Robot) -> String {
+    // Numbers are finite and keys are texts: nothing of this can fail to be written.
+    serde_json::to_string_pretty(&RobotData::new(robot)).unwrap_or_default() + "\n"
+}
+
+/// YAML in blocks. Texts are quoted as in JSON, which YAML reads alike.
+pub(super) fn yaml(robot: &Robot) -> String {
+    let data = RobotData::new(robot);
+    let mut text = format!("name: {}\n", quoted(data.name));
+    let _ = writeln!(text, "is_calibrated: {}\nmodel: {}\nlinks:", data.is_calibrated, quoted(data.model));
+    for link in &data.links {
+        let _ = writeln!(text, "  - translation_m: [{}]", link.translation_m.map(yaml_number).join(", "));
+        for (key, value) in [("alpha_rad", link.alpha_rad), ("beta_rad", link.beta_rad), ("gamma_rad", link.gamma_rad)] {
+            let _ = writeln!(text, "    {key}: {}", yaml_number(value));
+        }
+    }
+    text += "joints:\n";
+    for joint in &data.joints {
+        let _ = writeln!(text, "  - type: {}\n    unit: {}", joint.kind, joint.unit);
+        for (key, value) in [("offset", joint.offset), ("scale", joint.scale), ("min", joint.min), ("max", joint.max)] {
+            let _ = writeln!(text, "    {key}: {}", yaml_number(value));
+        }
+    }
+    text
+}
+
+/// With a point even before an exponent: YAML 1.1 reads `1e-17` as a text.
+fn yaml_number(value: f64) -> String {
+    let text = format!("{value:?}");
+    if text.contains('.') { text } else { text.replacen('e', ".0e", 1) }
+}
+
+fn quoted(text: &str) -> String {
+    serde_json::to_string(text).unwrap_or_default()
+}
+
+pub(super) fn csv(robot: &Robot) -> String {
+    let mut text = format!("# {}\n# {MODEL}\nparameter,unit,value\n", origin(robot));
+    for (i, &value) in robot.chain.parameters().iter().enumerate() {
+        let parameter = Parameter::from_index(i);
+        let unit = ScreenUnit::from(robot.chain.unit(parameter));
+        let _ = writeln!(text, "{parameter},{},{:?}", unit.name(), unit.from_si(value));
+    }
+    text
+}

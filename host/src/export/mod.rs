@@ -1,0 +1,74 @@
+//! A robot in the formats of others: one file a format, and remarks on what a format cannot hold.
+
+mod code;
+mod data;
+mod dh;
+mod urdf;
+
+use crate::files::Robot;
+use crate::kinematics::Convention;
+
+/// What to write a robot as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Robot description of ROS
+    Urdf,
+    /// ROS 2 parameter file with the URDF as robot_description
+    Ros2,
+    /// Denavit-Hartenberg table, CSV
+    Dh,
+    /// Modified Denavit-Hartenberg table (Craig), CSV
+    Mdh,
+    /// Chain as JSON, metres and radians
+    Json,
+    /// Chain as YAML, metres and radians
+    Yaml,
+    /// Parameters as CSV, millimetres and degrees
+    Csv,
+    /// C header, metres and radians
+    C,
+    /// Rust constants, metres and radians
+    Rust,
+    /// MATLAB or Octave function that computes the tool's pose, metres and radians
+    Octave,
+}
+
+/// A robot's text, and what its reader should know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exported {
+    /// Contents of the file.
+    pub text: String,
+    /// What the format cannot hold, where that went, and what looks like a fault and is none.
+    pub remarks: Vec<String>,
+    /// Of a format with another model: the largest differences to the robot over random joint vectors, metres and radians.
+    pub largest_difference: Option<(f64, f64)>,
+}
+
+/// Writes a robot in a format.
+pub fn export(robot: &Robot, format: Format) -> Exported {
+    let exact = |text| Exported { text, remarks: Vec::new(), largest_difference: None };
+    match format {
+        Format::Urdf => Exported { text: urdf::text(robot), remarks: urdf::remarks(robot), largest_difference: None },
+        Format::Ros2 => Exported { text: urdf::ros2_parameters(robot), remarks: urdf::remarks(robot), largest_difference: None },
+        Format::Dh => dh::exported(robot, Convention::Standard),
+        Format::Mdh => dh::exported(robot, Convention::Modified),
+        Format::Json => exact(data::json(robot)),
+        Format::Yaml => exact(data::yaml(robot)),
+        Format::Csv => exact(data::csv(robot)),
+        Format::C => exact(code::c_header(robot)),
+        Format::Rust => exact(code::rust_constants(robot)),
+        Format::Octave => exact(code::octave_function(robot)),
+    }
+}
+
+/// A robot's name with nothing that could end a comment or a quoted text, or go on on another line.
+fn plain_name(robot: &Robot) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || " _-.,()".contains(c);
+    robot.name.chars().take(120).map(|c| if is_plain(c) { c } else { '_' }).collect()
+}
+
+/// Where a robot's numbers come from, in a line for a comment.
+fn origin(robot: &Robot) -> String {
+    let is_calibrated = if robot.calibration.is_some() { "calibrated" } else { "design, not calibrated" };
+    format!("{}: {is_calibrated}. Written by host-cal {}.", plain_name(robot), env!("CARGO_PKG_VERSION"))
+}

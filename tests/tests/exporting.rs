@@ -1,0 +1,272 @@
+//! Robots in the formats of others and back, held against the chain by 4×4 products.
+
+use std::f64::consts::PI;
+use std::fs;
+
+use ballbar::JointKind;
+use ballbar_tests::naive;
+use host_cal::export::{Format, export};
+use host_cal::files::{Imported, ROBOTS, Robot, Source, UrdfEnds, read_targets, read_urdf};
+use host_cal::kinematics::{Compensator, Convention, DhTable};
+use nalgebra::{Isometry3, Matrix4, Translation3, Unit, UnitQuaternion, Vector3};
+use num_complex::Complex;
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+/// Metres and radians: what the round trip may lose.
+const ROUNDING: f64 = 1e-12;
+
+fn imported(text: &str, ends: UrdfEnds<'_>) -> Result<Imported, String> {
+    let folder = TempDir::new().expect("a temporary folder");
+    let path = folder.path().join("robot.urdf");
+    fs::write(&path, text).expect("a file");
+    read_urdf(&path, ends).map_err(|error| error.to_string().replace(&path.display().to_string(), "robot.urdf"))
+}
+
+/// The tool's pose, by complex 4×4 products of the file's parameters.
+fn pose(robot: &Robot, q: &[f64]) -> Matrix4<f64> {
+    let parameters: Vec<Complex<f64>> = robot.chain.parameters().iter().map(|&value| value.into()).collect();
+    naive::base_from_tool(robot.chain.joint_kinds(), &parameters, q).map(|entry| entry.re)
+}
+
+/// Joint vectors over the limits, corners among them.
+fn joint_vectors(robot: &Robot) -> Vec<Vec<f64>> {
+    let at = |share: f64, i: usize| (share + 0.37 * i as f64).fract();
+    let vector = |step: usize| {
+        let joints = robot.limits.iter().enumerate();
+        joints.map(|(i, limits)| limits.min + (limits.max - limits.min) * at(step as f64 / 20.0, i)).collect()
+    };
+    (0..20).map(vector).collect()
+}
+
+/// A robot of 1 to 8 joints of either kind, nothing aligned, as the text of its file.
+fn robots() -> impl Strategy<Value = Robot> {
+    let scale = prop_oneof![0.5..1.5, -1.5..-0.5];
+    let joint = (any::<bool>(), -180.0..180.0, scale, -170.0..-10.0, 10.0..170.0);
+    let link = (prop::array::uniform3(-900.0..900.0), prop::array::uniform3(-180.0..180.0));
+    (prop::collection::vec((link.clone(), joint), 1..=8), link).prop_map(|(pairs, last)| {
+        let mut text = String::from("name = \"any <robot> & \\\"more\\\"\"\n");
+        let mut link = |(xyz, angles): ([f64; 3], [f64; 3])| {
+            text += &format!("[[links]]\ntranslation_mm = {xyz:?}\nrotation_deg = {angles:?}\n");
+        };
+        pairs.iter().for_each(|(each, _)| link(*each));
+        link(last);
+        for (_, (slides, offset, scale, min, max)) in &pairs {
+            let (kind, unit) = if *slides { ("prismatic", "mm") } else { ("revolute", "deg") };
+            text += &format!("[[joints]]\ntype = \"{kind}\"\noffset_{unit} = {offset:?}\nscale = {scale:?}\n");
+            text += &format!("min_{unit} = {min:?}\nmax_{unit} = {max:?}\n");
+        }
+        Robot::parse(&Source::new("any", &text)).unwrap()
+    })
+}
+
+fn survives_urdf(robot: &Robot) {
+    let text = export(robot, Format::Urdf).text;
+    let again = imported(&text, UrdfEnds::default()).unwrap_or_else(|error| panic!("{error}\n{text}")).robot;
+    assert_eq!(again.name, robot.name);
+    for (before, after) in robot.limits.iter().zip(&again.limits) {
+        assert!((before.min - after.min).abs() < ROUNDING && (before.max - after.max).abs() < ROUNDING, "{before:?} {after:?}");
+    }
+    for q in joint_vectors(robot) {
+        let off = (pose(robot, &q) - pose(&again, &q)).amax();
+        assert!(off < ROUNDING, "{off:e} at {q:?}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_robot_survives_a_urdf(robot in robots()) {
+        survives_urdf(&robot);
+    }
+
+    #[test]
+    fn any_robot_has_both_tables(robot in robots()) {
+        for convention in [Convention::Standard, Convention::Modified] {
+            let table = DhTable::new(&robot.chain, convention);
+            // Two axes taken at random are nearly parallel once in thousands.
+            prop_assume!(table.nearly_parallel.is_empty());
+            for q in joint_vectors(&robot) {
+                let theirs = table.base_from_tool(&q);
+                let ours = pose(&robot, &q);
+                let off_m = (ours.fixed_view::<3, 1>(0, 3) - theirs.translation_m).amax();
+                let turned = (ours.fixed_view::<3, 3>(0, 0) - theirs.rotation).amax();
+                prop_assert!(off_m < 1e-9 && turned < 1e-9, "{convention:?}: {off_m:e} m, {turned:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_built_in_robots_survive_a_urdf_and_both_tables() {
+    for (name, _) in ROBOTS {
+        let robot = Robot::open(name).unwrap();
+        survives_urdf(&robot);
+        for convention in [Convention::Standard, Convention::Modified] {
+            let (off_m, turned_rad) = DhTable::new(&robot.chain, convention).largest_difference(&robot.chain, &robot.limits);
+            assert!(off_m < 1e-9 && turned_rad < 1e-9, "{name} {convention:?}: {off_m:e} m, {turned_rad:e} rad");
+        }
+    }
+}
+
+#[test]
+fn the_table_of_the_ur5e_is_the_one_that_its_maker_publishes() {
+    let robot = Robot::open("ur5e").unwrap();
+    let table = DhTable::new(&robot.chain, Convention::Standard);
+    // Universal Robots: a, d in metres; the signs of a and the turns of theta that go with them are a matter of choice.
+    let (a, d) = ([0.0, 0.425, 0.3922, 0.0, 0.0, 0.0], [0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996]);
+    for (i, row) in table.rows.iter().enumerate() {
+        assert!((row.a_m.abs() - a[i]).abs() < 1e-12, "a{} = {}", i + 1, row.a_m);
+        assert!((row.d_m.abs() - d[i]).abs() < 1e-12, "d{} = {}", i + 1, row.d_m);
+    }
+    assert!(table.nearly_parallel.is_empty(), "exactly parallel axes are no trouble");
+}
+
+#[test]
+fn nearly_parallel_axes_are_explained() {
+    let optimised = export(&Robot::open("puma560-optimised").unwrap(), Format::Dh);
+    assert!(
+        optimised.remarks.iter().any(|remark| remark.contains("axes 2 and 3") && remark.contains("no fault")),
+        "{optimised:?}"
+    );
+    assert!(export(&Robot::open("puma560").unwrap(), Format::Dh).remarks.is_empty());
+}
+
+const ODD_AXES: &str = r#"<robot name="odd">
+  <link name="world"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="tool"/><link name="camera"/>
+  <joint name="stand" type="fixed"><parent link="world"/><child link="a"/><origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.5 0.6"/></joint>
+  <joint name="j1" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/><axis xyz="0 -2 0"/>
+    <limit lower="-1" upper="2" effort="0" velocity="0"/></joint>
+  <joint name="j2" type="prismatic"><parent link="b"/><child link="c"/><origin rpy="0 1.5707963267948966 0"/><axis xyz="1 1 0"/>
+    <limit lower="0" upper="0.4" effort="0" velocity="0"/></joint>
+  <joint name="j3" type="continuous"><parent link="c"/><child link="d"/><origin xyz="0.2 0 0" rpy="1 2 3"/><axis xyz="0 0 -1"/></joint>
+  <joint name="flange" type="fixed"><parent link="d"/><child link="tool"/><origin xyz="0 0 0.1" rpy="0 0 0.7"/></joint>
+  <joint name="mount" type="floating"><parent link="d"/><child link="camera"/></joint>
+</robot>"#;
+
+#[test]
+fn joints_about_any_axis_become_joints_about_z() {
+    let robot = imported(ODD_AXES, UrdfEnds { base: None, tip: Some("tool") }).unwrap();
+    assert_eq!((robot.base.as_str(), robot.joints.join(" ").as_str()), ("world", "j1 j2 j3"));
+    assert!(robot.remarks.iter().any(|remark| remark.contains("`j3`")), "{:?}", robot.remarks);
+    let kinds = [JointKind::Revolute, JointKind::Prismatic, JointKind::Revolute];
+    assert_eq!(robot.robot.chain.joint_kinds(), kinds);
+    let origin = |xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]| {
+        Isometry3::from_parts(Translation3::from(Vector3::from(xyz)), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+    };
+    let about = |axis: [f64; 3], angle| {
+        Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Unit::new_normalize(axis.into()), angle))
+    };
+    for q in [[0.0; 3], [0.3, 0.1, -2.0], [-0.9, 0.39, 3.0], [2.0, 0.2, PI / 2.0]] {
+        let slide = Translation3::from(Vector3::new(1.0, 1.0, 0.0).normalize() * q[1]);
+        let expected = origin([0.1, -0.2, 0.3], [0.4, -0.5, 0.6])
+            * origin([0.0, 0.0, 0.5], [0.0; 3])
+            * about([0.0, -1.0, 0.0], q[0])
+            * origin([0.0; 3], [0.0, PI / 2.0, 0.0])
+            * slide
+            * origin([0.2, 0.0, 0.0], [1.0, 2.0, 3.0])
+            * about([0.0, 0.0, -1.0], q[2])
+            * origin([0.0, 0.0, 0.1], [0.0, 0.0, 0.7]);
+        assert!((expected.to_homogeneous() - pose(&robot.robot, &q)).amax() < ROUNDING, "{q:?}");
+    }
+}
+
+fn refusal(text: &str) -> String {
+    imported(text, UrdfEnds::default()).expect_err("is refused")
+}
+
+#[test]
+fn hostile_files_are_refused_clearly() {
+    let joint = |name: &str, parent: &str, child: &str| {
+        format!(
+            r#"<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/><axis xyz="0 0 1"/></joint>"#
+        )
+    };
+    let robot = |links: &[&str], joints: &[String]| {
+        let links: String = links.iter().map(|name| format!("<link name=\"{name}\"/>\n")).collect();
+        format!("<robot name=\"r\">\n{links}{}\n</robot>", joints.join("\n"))
+    };
+    let two = robot(&["a", "b"], &[joint("j", "a", "b")]);
+    assert!(imported(&two, UrdfEnds::default()).is_ok());
+
+    let bomb = format!("<!DOCTYPE r [<!ENTITY a \"{}\"><!ENTITY b \"&a;&a;&a;&a;\">]>\n{two}", "ha".repeat(1000));
+    assert!(refusal(&bomb).contains("not XML that can be read"), "{}", refusal(&bomb));
+    let long = robot(&["a", "b"], &[joint(&"n".repeat(100_000_000), "a", "b")]);
+    assert!(refusal(&long).contains("longer than 8388608 bytes"));
+    let long = refusal(&robot(&["a", "b"], &[joint(&"n".repeat(1_000_000), "a", "b")]));
+    assert!(long.contains("1000000 bytes long") && long.len() < 400, "{long}");
+
+    let circle = robot(&["r", "a", "b", "c"], &[joint("1", "a", "b"), joint("2", "b", "c"), joint("3", "c", "a")]);
+    assert!(refusal(&circle).contains("run in a circle"), "{}", refusal(&circle));
+    let itself = robot(&["a", "b"], &[joint("1", "b", "b")]);
+    assert!(refusal(&itself).contains("run in a circle"), "{}", refusal(&itself));
+    let orphan = robot(&["a", "b"], &[joint("j", "nowhere", "b")]);
+    assert!(refusal(&orphan).contains("`nowhere`, which is not there"), "{}", refusal(&orphan));
+    let two_parents = robot(&["a", "b", "c"], &[joint("1", "a", "c"), joint("2", "b", "c")]);
+    assert!(refusal(&two_parents).contains("child of two joints"));
+    assert!(refusal(&robot(&["a", "b"], &[])).contains("2 links have no joint above them: a, b"));
+    assert!(refusal(&robot(&["a", "b", "c"], &[joint("1", "a", "b"), joint("2", "a", "c")])).contains("several ends"));
+    assert!(refusal(&robot(&["a"], &[])).contains("0 joints, expected 1 to 8"));
+    let names: Vec<String> = (0..10).map(|i| format!("l{i}")).collect();
+    let nine: Vec<String> = (0..9).map(|i| joint(&format!("j{i}"), &names[i], &names[i + 1])).collect();
+    let links: Vec<&str> = names.iter().map(String::as_str).collect();
+    assert!(refusal(&robot(&links, &nine)).contains("9 joints, expected 1 to 8"));
+
+    for (found, broken, says) in [
+        ("xyz=\"0 0 1\"", "xyz=\"0 0 0\"", "axis of joint `j` is of no length"),
+        ("xyz=\"0 0 1\"", "xyz=\"0 0\"", "xyz of joint `j` is `0 0`"),
+        ("xyz=\"0 0 1\"", "xyz=\"0 nan 1\"", "`0 nan 1`"),
+        ("xyz=\"0 0 1\"", "xyz=\"0 1e99 1\"", "`0 1e99 1`"),
+        ("\"continuous\"", "\"planar\"", "type of joint `j` is `planar`"),
+        ("\"continuous\"", "\"revolute\"", "<limit> of joint `j` is missing"),
+        ("<axis", "<mimic joint=\"k\"/><axis", "<mimic> of joint `j`"),
+        ("<robot", "<sdf", "not XML"),
+    ] {
+        let refusal = refusal(&two.replacen(found, broken, 1));
+        assert!(refusal.starts_with("robot.urdf:") && refusal.contains(says), "{refusal}");
+    }
+}
+
+#[test]
+fn large_files_take_no_long_time() {
+    let begun = std::time::Instant::now();
+    let deep = "<a>".repeat(150_000) + &"</a>".repeat(150_000);
+    let attributes: String = (0..100_000).map(|i| format!(" a{i}=\"\"")).collect();
+    let many_nodes = format!("<robot name=\"r\">{}</robot>", "<link name=\"a\"/>".repeat(300_000));
+    let spaces: String = (0..60_000).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect();
+    for text in [format!("<robot name=\"r\">{deep}</robot>"), format!("<robot name=\"r\"{attributes}/>"), many_nodes, spaces] {
+        let refusal = refusal(&text);
+        assert!(refusal.len() < 600, "{refusal}");
+    }
+    assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
+}
+
+#[test]
+fn a_compensated_controller_brings_the_tool_to_the_target() {
+    let (real, nominal) = (Robot::open("puma560-optimised").unwrap(), Robot::open("puma560").unwrap());
+    // The elbow well bent: near a straight arm (q3 = 90) millimetres turn it by many degrees.
+    let text = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,-40,160,20,-50,50\n-60,-100,30,-20,40,0\n";
+    let targets = read_targets(&Source::new("targets", text), &nominal).unwrap();
+    let compensator = Compensator::new(&real, &nominal);
+    for target in &targets {
+        let found = compensator.compensate(target, |q| q).unwrap();
+        let q = target.q.as_array();
+        let wanted = pose(&nominal, q);
+        let off = |q: &[f64]| (pose(&real, q) - wanted).amax();
+        assert!(off(q) > 1e-3 && off(found.q.as_array()) < 1e-9, "{} {}", off(q), off(found.q.as_array()));
+        assert!(found.before.0 > 1e-3 && found.left.0 < 1e-9, "{found:?}");
+        let largest = found.q.as_array().iter().zip(q).map(|(new, old)| (new - old).abs()).fold(0.0, f64::max);
+        assert!(largest < 0.2, "another branch: {:?} of {q:?}", found.q);
+        let believed = found.nominal_base_from_tool.translation_m;
+        assert!((pose(&nominal, found.q.as_array()).fixed_view::<3, 1>(0, 3) - believed).amax() < ROUNDING);
+    }
+
+    let with_pose = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg\n\
+                     0,-45,135,0,30,0,500,150,600,0,90,0\n0,-45,135,0,30,0,9000,150,600,0,90,0\n";
+    let targets = read_targets(&Source::new("targets", with_pose), &nominal).unwrap();
+    let found = compensator.compensate(&targets[0], |q| q).unwrap();
+    let reached = pose(&real, found.q.as_array());
+    assert!((reached.fixed_view::<3, 1>(0, 3) - Vector3::new(0.5, 0.15, 0.6)).amax() < 1e-9, "{reached}");
+    assert!(compensator.compensate(&targets[1], |q| q).is_none(), "nine metres are out of reach");
+    let half = read_targets(&Source::new("targets", &with_pose.replace(",gamma_deg", "").replace(",0\n", "\n")), &nominal);
+    assert!(half.unwrap_err().to_string().contains("`gamma_deg` is missing"));
+}
