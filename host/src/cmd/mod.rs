@@ -26,6 +26,7 @@ mod ports;
 mod pose;
 mod rank;
 mod report;
+mod report_page;
 mod simulate;
 mod status;
 mod stream;
@@ -57,6 +58,7 @@ enum Command {
     Fit(fit::FitArgs),
     Validate(validate::ValidateArgs),
     Rank(rank::RankArgs),
+    Report(report_page::ReportArgs),
     Fk(fk::FkArgs),
     Plan(plan::PlanArgs),
     Collect(collect::CollectArgs),
@@ -86,6 +88,7 @@ impl Cli {
             Command::Fit(args) => args.run(),
             Command::Validate(args) => args.run(),
             Command::Rank(args) => args.run(),
+            Command::Report(args) => args.run(),
             Command::Fk(args) => args.run(),
             Command::Plan(args) => args.run(),
             Command::Collect(args) => args.run(),
