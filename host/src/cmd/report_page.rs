@@ -116,7 +116,7 @@ impl ReportArgs {
     /// The files of `--validate`, and what to call them.
     fn others(&self, measured: &Measured) -> Result<Vec<(String, Dataset)>, CommandError> {
         let read = |path: &PathBuf| {
-            let rows = Dataset::read([path.as_path()].into_iter(), &measured.robot, &measured.rig)?;
+            let rows = Dataset::read([path.as_path()], &measured.robot, &measured.rig)?;
             if rows.rows.is_empty() { Err(EmptyError(path.clone()).into()) } else { Ok((path.display().to_string(), rows)) }
         };
         self.validate.iter().map(read).collect()

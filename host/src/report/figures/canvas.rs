@@ -44,6 +44,8 @@ pub(super) const HEIGHT: u32 = 600;
 const TEXT: u32 = 31;
 const LINE: u32 = 4;
 const DOT: u32 = 4;
+/// Labels of powers of ten that an axis has room for.
+const MOST_POWERS: f64 = 8.0;
 
 /// Style rules that turn the colours of the figures into those of a dark page.
 pub(in crate::report) fn dark_rules() -> String {
@@ -109,7 +111,7 @@ impl Axis<'_> {
     fn count(&self, room: usize) -> usize {
         match self.labels {
             Labels::Numbers => room,
-            Labels::Powers => (self.range.end - self.range.start).ceil().max(1.0) as usize + 1,
+            Labels::Powers => (self.range.end - self.range.start).ceil().clamp(1.0, MOST_POWERS) as usize + 1,
             Labels::Names(names) => names.len() + 1,
         }
     }

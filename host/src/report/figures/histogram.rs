@@ -6,7 +6,7 @@ use super::canvas::{AFTER, Axis, CURVE, HEIGHT, Labels, WIDTH, about_zero, chart
 use super::table::{Table, number};
 use super::{Figure, FigureError};
 use crate::report::facts::Facts;
-use crate::units::mm_from_m;
+use crate::units::{fixed, mm_from_m};
 
 const NAME: &str = "histogram";
 /// Below this probability of so uneven a sample from a normal distribution, it is called not normal.
@@ -55,7 +55,8 @@ pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
         Some(test) => format!("the Anderson-Darling test has nothing against normal noise (p = {:.2})", test.p_value),
     };
     let sentence = format!(
-        "Bars that follow the normal curve (mean {mean:.4} mm, deviation {deviation:.4} mm) mean noise and no more; {test} (the paper's Fig. 4)."
+        "Bars that follow the normal curve (mean {} mm, deviation {deviation:.4} mm) mean noise and no more; {test} (the paper's Fig. 4).",
+        fixed(mean, 4)
     );
     Ok(Some(Figure { name: NAME, title: "How the residuals are distributed", sentence, svg, data, wide: false }))
 }

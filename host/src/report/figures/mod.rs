@@ -51,7 +51,8 @@ pub struct FigureError {
 /// # Errors
 /// [`FigureError`] when the plotting library refuses.
 pub fn all(facts: &Facts) -> Result<Vec<Figure>, FigureError> {
-    let draw: [fn(&Facts) -> Result<Option<Figure>, FigureError>; 10] = [
+    type Draw = fn(&Facts) -> Result<Option<Figure>, FigureError>;
+    let draw: [Draw; 10] = [
         proof::figure,
         shell::figure,
         histogram::figure,
