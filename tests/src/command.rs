@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
 
-/// Builds the binary once (nothing to do when it is fresh).
+/// Builds the binary once (nothing to do when it is fresh). A test is named with it, the smallest: so the libraries have the features
+/// that `cargo test --workspace` gave them, and none is compiled a second time.
 static HOST_CAL: LazyLock<PathBuf> = LazyLock::new(|| {
-    let build = escargot::CargoBuild::new().package("host-cal").bin("host-cal");
+    let build = escargot::CargoBuild::new().bin("host-cal").args(["--workspace", "--test", "image_sizes"]);
     build.run().expect("host-cal builds").path().to_owned()
 });
 

@@ -38,4 +38,4 @@ pub use planner::{Comparison, Plan, PlanError, PlanOptions, ShellSummary, plan};
 pub use posture::Hindrance;
 pub use quality::{Expectation, Quality};
 pub use scene::{FixturesOverlap, Scene};
-pub use way::way_between;
+pub use transfer::way_between;

@@ -1,4 +1,4 @@
-//! The way from the last pose of one shell to the first of the next, with the bar taken off.
+//! Ways between any two joint vectors: from the last pose of one shell to the first of the next, with the bar taken off; and on a shell.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,7 +7,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cell::Cell;
-use super::way::{is_clear, is_sound};
+use super::posture::Shell;
+use super::way::{self, is_clear, is_sound};
+use crate::files::PairingId;
 
 /// Samples of the joint space before a way counts as not there.
 const SAMPLES: usize = 1500;
@@ -15,6 +17,21 @@ const SAMPLES: usize = 1500;
 const BRANCH_S: f64 = 1.0;
 /// Tries to leave out pieces of a way.
 const SHORTCUTS: usize = 100;
+
+/// Via points from one joint vector to another, with the bar on (ends and its length at mid travel, metres) or off; `None` when none
+/// were found. The same seed gives the same way.
+pub fn way_between(
+    cell: &Cell<'_>,
+    joined: Option<(PairingId, f64)>,
+    a: &JointVector<f64>,
+    b: &JointVector<f64>,
+    seed: u64,
+) -> Option<Vec<JointVector<f64>>> {
+    match joined {
+        None => free(cell, a, b, seed),
+        Some((id, bar_m)) => way::attached(cell, &Shell { id, pairing: cell.rig.pairing(id), bar_m }, a, b),
+    }
+}
 
 /// Brings poses that follow one another to `from`: shifts all of them by whole turns of single joints, where limits allow it and no way
 /// was found otherwise. The via points to the first pose; `None` when none were found.

@@ -8,8 +8,6 @@ use ballbar::JointVector;
 
 use super::cell::{Cell, halfway};
 use super::posture::Shell;
-use super::transfer;
-use crate::files::PairingId;
 
 /// Halvings of a way at most: up to 63 via points.
 const DEEPEST: usize = 6;
@@ -19,21 +17,6 @@ const COARSEST_STEP: f64 = 0.035;
 const SAMPLING_GUARD_M: f64 = 0.0007;
 /// Where nothing is certain at this motion of any point, the way counts as blocked, metres.
 const FINEST_MOTION_M: f64 = 0.002;
-
-/// Via points from one joint vector to another, with the bar on (ends and its length at mid travel, metres) or off; `None` when none
-/// were found. The same seed gives the same way.
-pub fn way_between(
-    cell: &Cell<'_>,
-    joined: Option<(PairingId, f64)>,
-    a: &JointVector<f64>,
-    b: &JointVector<f64>,
-    seed: u64,
-) -> Option<Vec<JointVector<f64>>> {
-    match joined {
-        None => transfer::free(cell, a, b, seed),
-        Some((id, bar_m)) => attached(cell, &Shell { id, pairing: cell.rig.pairing(id), bar_m }, a, b),
-    }
-}
 
 /// Via points from `a` to `b`, both of which keep all margins, with the bar attached; `None` when none were found.
 pub(super) fn attached(

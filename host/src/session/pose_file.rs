@@ -186,3 +186,29 @@ impl PoseFile {
 fn plan_row(line: &str) -> Option<usize> {
     line.rsplit(',').nth(PLAN_ROW_FROM_END)?.trim().parse().ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(plan_row: Option<usize>) -> SettledRow<'static> {
+        let q = JointVector::zero();
+        SettledRow { chuck: "A", sphere: "1", q, length_m: 0.46, t_s: 1.0, bar_m: 0.46, rate_m_s: Some(0.002), plan_row }
+    }
+
+    #[test]
+    fn the_poses_of_the_latest_move_are_erased_together_and_others_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("poses.csv");
+        let kinds = [JointKind::Revolute];
+        let mut file = PoseFile::open(&path, &kinds).unwrap();
+        file.add([Some(2), Some(5), Some(5), None].map(row)).unwrap();
+        assert_eq!(file.erase_last().unwrap(), Erased { poses: 1, plan_row: None });
+        assert_eq!(file.erase_last().unwrap(), Erased { poses: 2, plan_row: Some(5) });
+        assert_eq!(file.added(), 1);
+        let read_again = PoseFile::open(&path, &kinds).unwrap();
+        assert_eq!(read_again.plan_rows().collect::<Vec<_>>(), [2]);
+        assert_eq!(file.erase_last().unwrap(), Erased { poses: 1, plan_row: Some(2) });
+        assert_eq!(file.erase_last().unwrap(), Erased::default());
+    }
+}
