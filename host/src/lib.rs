@@ -14,6 +14,7 @@
 //! | [`simulate`] | poses on hemispherical shells, simulated lengths, tool error over the workspace |
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
+//! | [`report`] | a calibration as a page for people: facts, figures, HTML |
 //! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
 //!
 //! SI units inside; millimetres and degrees in files and on screens, converted at the edge (see [`units`]).
@@ -28,6 +29,7 @@ pub mod identify;
 pub mod kinematics;
 pub mod paper;
 pub mod plan;
+pub mod report;
 pub mod robot_link;
 pub mod session;
 pub mod simulate;

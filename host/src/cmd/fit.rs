@@ -90,12 +90,12 @@ pub(super) struct FitReport {
     outliers: Vec<usize>,
     outlier_details: Vec<OutlierLine>,
     largest: Vec<ResidualLine>,
-    remarks: Vec<String>,
+    pub(super) remarks: Vec<String>,
     warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<String>,
     /// Why the result is not to be kept; nothing was written then.
-    objection: Option<String>,
+    pub(super) objection: Option<String>,
     #[serde(skip)]
     asked_out: Option<String>,
 }

@@ -29,6 +29,7 @@ mod ports;
 mod pose;
 mod rank;
 mod report;
+mod report_page;
 mod simulate;
 mod status;
 mod stream;
@@ -60,6 +61,7 @@ enum Command {
     Fit(fit::FitArgs),
     Validate(validate::ValidateArgs),
     Rank(rank::RankArgs),
+    Report(report_page::ReportArgs),
     Fk(fk::FkArgs),
     Export(export::ExportArgs),
     Import(import::ImportArgs),
@@ -92,6 +94,7 @@ impl Cli {
             Command::Fit(args) => args.run(),
             Command::Validate(args) => args.run(),
             Command::Rank(args) => args.run(),
+            Command::Report(args) => args.run(),
             Command::Fk(args) => args.run(),
             Command::Export(args) => args.run(),
             Command::Import(args) => args.run(),

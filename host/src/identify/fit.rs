@@ -121,6 +121,8 @@ pub struct Fit {
     pub neighbour_correlation: Option<f64>,
     /// Prediction of poses left out; `None` when too few are left to fit.
     pub cross_validation: Option<CrossValidation>,
+    /// Residuals of all rows while they were left out; none where there is no cross-validation.
+    pub left_out: Vec<Residual>,
 }
 
 impl Fit {
@@ -181,6 +183,7 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
     let uncertainty = Uncertainty::new(&solution.chain, &measurements, &free);
     let before = residuals(design, dataset);
     let after = residuals(&solution.chain, dataset);
+    let (cross_validation, left_out) = cross_validate(design, &measurements, &free, &lm).unzip();
     Ok(Fit {
         solve_time,
         identifiability,
@@ -191,7 +194,8 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
         fitted_by_pairing: by_pairing(dataset, &after),
         outliers: outliers(dataset, &after),
         neighbour_correlation: neighbour_correlation(dataset, &after),
-        cross_validation: cross_validate(design, &measurements, &free, &lm),
+        cross_validation,
+        left_out: left_out.unwrap_or_default(),
         residuals: after,
         uncertainty,
         solution,
@@ -225,7 +229,7 @@ fn cross_validate(
     measurements: &[Measurement<f64>],
     free: &FreeParameters,
     lm: &LmOptions,
-) -> Option<CrossValidation> {
+) -> Option<(CrossValidation, Vec<Residual>)> {
     let mut numbers: HashMap<[u64; MAX_JOINTS], usize> = HashMap::new();
     let group_of_row: Vec<usize> = measurements
         .iter()
@@ -235,20 +239,20 @@ fn cross_validate(
         })
         .collect();
     let groups = numbers.len();
-    let part = |folds: usize, fold: usize| -> (Vec<Measurement<f64>>, Vec<Measurement<f64>>) {
-        let rows = measurements.iter().copied().zip(&group_of_row);
-        let (left_out, kept): (Vec<_>, Vec<_>) = rows.partition(|(_, group)| **group % folds == fold);
-        (kept.into_iter().map(|row| row.0).collect(), left_out.into_iter().map(|row| row.0).collect())
-    };
     let kept = |folds: usize, fold: usize| group_of_row.iter().filter(|&group| group % folds != fold).count();
     let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| kept(folds, fold) > free.len());
     let folds = [5, 10, groups].into_iter().find(enough)?;
 
-    let mut squares = 0.0;
+    let mut left_out = vec![Residual { value_m: 0.0, weight: 1.0 }; measurements.len()];
     for fold in 0..folds {
-        let (kept, left_out) = part(folds, fold);
+        let is_left_out = |row: usize| group_of_row[row] % folds == fold;
+        let kept: Vec<_> = (0..measurements.len()).filter(|&row| !is_left_out(row)).map(|row| measurements[row]).collect();
         let kinematics = Kinematics::new(&solve(design, &kept, free, lm).chain);
-        squares += left_out.iter().map(|measurement| measurement.weight * kinematics.residual(measurement).powi(2)).sum::<f64>();
+        for row in (0..measurements.len()).filter(|&row| is_left_out(row)) {
+            let measurement = &measurements[row];
+            left_out[row] = Residual { value_m: kinematics.residual(measurement), weight: measurement.weight };
+        }
     }
-    Some(CrossValidation { folds, rms_m: (squares / measurements.len() as f64).sqrt() })
+    let squares: f64 = left_out.iter().map(|f| f.weight * f.value_m.powi(2)).sum();
+    Some((CrossValidation { folds, rms_m: (squares / measurements.len() as f64).sqrt() }, left_out))
 }

@@ -1,0 +1,243 @@
+//! Everything that the page says, computed from robot, rig, poses and fit. SI units, base frame.
+
+use ballbar::{Chain, JointKind, Kinematics, Vector3};
+use nalgebra::DMatrix;
+
+use super::workspace::Workspace;
+use crate::files::{Dataset, PairingId, PoseRow, Rig, Robot};
+use crate::identify::{AndersonDarling, Fit, FittedParameter, Outlier, Residual, ResidualSummary, anderson_darling, residuals};
+
+/// What the facts are computed from.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    /// The robot that the fit began with.
+    pub robot: &'a Robot,
+    /// Chucks and spheres.
+    pub rig: &'a Rig,
+    /// The poses that were fitted.
+    pub dataset: &'a Dataset,
+    /// The fit to them.
+    pub fit: &'a Fit,
+    /// Poses that the fit has not seen, and what to call them; none is empty.
+    pub unseen: &'a [(String, &'a Dataset)],
+    /// Why the result is not to be kept, if it is not.
+    pub objection: Option<&'a str>,
+    /// What else is to be known, in whole sentences.
+    pub remarks: &'a [String],
+}
+
+/// One fitted pose.
+#[derive(Clone, Debug)]
+pub struct RowFact {
+    /// Number over all files, from 1.
+    pub number: usize,
+    /// File and line.
+    pub place: String,
+    /// Index into [`Facts::pairings`].
+    pub pairing: usize,
+    /// Encoder outputs, radians or metres.
+    pub q: Vec<f64>,
+    /// Azimuth of the bar at the chuck, from the base's x towards its y, 0 to 2π radians.
+    pub longitude_rad: f64,
+    /// Elevation of the bar above the base's x-y plane, radians.
+    pub latitude_rad: f64,
+    /// When it was measured, seconds, where the file says so.
+    pub t_s: Option<f64>,
+    /// The sphere as the fit sees it, metres.
+    pub sphere_m: Vector3<f64>,
+    /// Residual with the design, measured less computed, metres.
+    pub before_m: f64,
+    /// The same with the fit.
+    pub after_m: f64,
+}
+
+/// How well lengths are predicted that the fit has not seen.
+#[derive(Clone, Debug)]
+pub struct Proof {
+    /// Which lengths, to follow "on".
+    pub name: String,
+    /// Residuals with the design, metres.
+    pub before: Vec<Residual>,
+    /// Residuals with the fit, metres.
+    pub after: Vec<Residual>,
+}
+
+impl Proof {
+    /// Size of the residuals with the design.
+    pub fn before_summary(&self) -> ResidualSummary {
+        ResidualSummary::new(&self.before)
+    }
+
+    /// Size of the residuals with the fit.
+    pub fn after_summary(&self) -> ResidualSummary {
+        ResidualSummary::new(&self.after)
+    }
+
+    /// Whether the fit predicts these lengths worse than the design does.
+    pub fn speaks_against(&self) -> bool {
+        self.after_summary().rms_m > self.before_summary().rms_m
+    }
+}
+
+/// Singular values of all columns at the design, scaled.
+#[derive(Clone, Debug)]
+pub struct Singular {
+    /// Descending.
+    pub values: Vec<f64>,
+    /// How many count.
+    pub rank: usize,
+}
+
+/// Correlations of the free parameters.
+#[derive(Clone, Debug)]
+pub struct Correlation {
+    /// Their names.
+    pub names: Vec<String>,
+    /// −1 to 1; zero where a parameter is undetermined.
+    pub values: DMatrix<f64>,
+}
+
+/// All of it.
+#[derive(Clone, Debug)]
+pub struct Facts {
+    /// Name of the robot.
+    pub robot: String,
+    /// Files of the fitted poses.
+    pub files: Vec<String>,
+    /// Kinds of the joints.
+    pub joints: Vec<JointKind>,
+    /// Chucks: name and centre, metres.
+    pub chucks: Vec<(String, Vector3<f64>)>,
+    /// Pairings that occur, as `chuck:sphere`, and the chuck's index.
+    pub pairings: Vec<(String, usize)>,
+    /// The fitted poses, in the order of measurement.
+    pub rows: Vec<RowFact>,
+    /// Residuals of the fitted poses with the design.
+    pub before: ResidualSummary,
+    /// Residuals of the fitted poses with the fit.
+    pub after: ResidualSummary,
+    /// What the fit has not seen: files and poses held out, then its own poses left out in turn.
+    pub proofs: Vec<Proof>,
+    /// All parameters.
+    pub parameters: Vec<FittedParameter>,
+    /// What the poses can tell.
+    pub singular: Singular,
+    /// RMS at the start and after each accepted step, metres.
+    pub rms_history_m: Vec<f64>,
+    /// Why the solve ended.
+    pub explanation: &'static str,
+    /// Standard deviation of one length, metres.
+    pub sigma_m: Option<f64>,
+    /// Correlation of residuals with the next ones measured.
+    pub neighbour_correlation: Option<f64>,
+    /// Whether the residuals look normal; `None` for too few.
+    pub normality: Option<AndersonDarling>,
+    /// Rows that stand out: index into `rows`.
+    pub outliers: Vec<Outlier>,
+    /// Of the free parameters.
+    pub correlation: Correlation,
+    /// Predicted error of the tool.
+    pub workspace: Workspace,
+    /// Why the result is not to be kept.
+    pub objection: Option<String>,
+    /// What else is to be known.
+    pub remarks: Vec<String>,
+}
+
+impl Facts {
+    /// Computes them.
+    pub fn new(inputs: &Inputs<'_>) -> Self {
+        let Inputs { robot, rig, dataset, fit, .. } = inputs;
+        let pairings = dataset.pairings();
+        let before = residuals(&robot.chain, dataset);
+        let rows = rows(inputs, &pairings, &before);
+        let after_m: Vec<f64> = rows.iter().map(|row| row.after_m).collect();
+        Self {
+            robot: robot.name.clone(),
+            files: dataset.files.clone(),
+            joints: robot.chain.joint_kinds().to_vec(),
+            chucks: rig.chucks.iter().map(|chuck| (chuck.name.clone(), chuck.position_m)).collect(),
+            pairings: pairings.iter().map(|&id| (rig.pairing_name(id), id.chuck)).collect(),
+            before: fit.initial,
+            after: fit.fitted,
+            proofs: proofs(inputs, before),
+            parameters: fit.parameters.clone(),
+            singular: Singular {
+                values: fit.identifiability.spectrum.singular_values.clone(),
+                rank: fit.identifiability.spectrum.rank,
+            },
+            rms_history_m: fit.solution.rms_history_m.clone(),
+            explanation: fit.solution.status.explanation(),
+            sigma_m: fit.uncertainty.sigma_m,
+            neighbour_correlation: fit.neighbour_correlation,
+            normality: anderson_darling(&after_m),
+            outliers: fit.outliers.clone(),
+            correlation: correlation(fit),
+            workspace: Workspace::new(robot, fit),
+            objection: inputs.objection.map(str::to_owned),
+            remarks: inputs.remarks.to_vec(),
+            rows,
+        }
+    }
+
+    /// Why the result is not to be kept: the fit's own reason, or a proof that speaks against it.
+    pub fn doubt(&self) -> Option<String> {
+        let against = || self.proofs.iter().find(|proof| proof.speaks_against());
+        let worse = || against().map(|proof| format!("The design predicts better than the fit on {}.", proof.name));
+        self.objection.clone().or_else(worse)
+    }
+
+    /// Number of parameters that the fit was free to change.
+    pub fn free_parameters(&self) -> usize {
+        self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
+    }
+}
+
+fn rows(inputs: &Inputs<'_>, pairings: &[PairingId], before: &[Residual]) -> Vec<RowFact> {
+    let Inputs { robot, dataset, fit, .. } = inputs;
+    let kinematics = Kinematics::new(&fit.solution.chain);
+    let fact = |(i, row): (usize, &PoseRow)| {
+        let sphere_m = kinematics.point_in_base(&row.measurement.q, &row.measurement.pairing.sphere_tool_m);
+        let bar_m = sphere_m - row.measurement.pairing.chuck_base_m;
+        RowFact {
+            number: row.number,
+            place: dataset.place(i),
+            pairing: pairings.iter().position(|&id| id == row.pairing).unwrap_or_default(),
+            q: row.measurement.q.as_array()[..robot.chain.joints()].to_vec(),
+            longitude_rad: bar_m.y.atan2(bar_m.x).rem_euclid(std::f64::consts::TAU),
+            latitude_rad: bar_m.z.atan2(bar_m.x.hypot(bar_m.y)),
+            t_s: row.t_s,
+            sphere_m,
+            before_m: before[i].value_m,
+            after_m: fit.residuals[i].value_m,
+        }
+    };
+    dataset.rows.iter().enumerate().map(fact).collect()
+}
+
+fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
+    let Inputs { robot, fit, .. } = inputs;
+    let of = |chain: &Chain<f64>, rows: &Dataset| residuals(chain, rows);
+    let unseen = inputs.unseen.iter().map(|(name, rows)| Proof {
+        name: name.clone(),
+        before: of(&robot.chain, rows),
+        after: of(&fit.solution.chain, rows),
+    });
+    let folds = fit.cross_validation.map(|proof| Proof {
+        name: format!("the fitted poses, each predicted by a fit without it ({} parts)", proof.folds),
+        before,
+        after: fit.left_out.clone(),
+    });
+    unseen.chain(folds).collect()
+}
+
+fn correlation(fit: &Fit) -> Correlation {
+    let free = fit.parameters.iter().filter(|parameter| parameter.held.is_none());
+    let names: Vec<String> = free.map(|parameter| parameter.parameter.to_string()).collect();
+    let uncertainty = &fit.uncertainty;
+    let value = |i: usize, j: usize| match (uncertainty.std[i], uncertainty.std[j]) {
+        (Some(a), Some(b)) if a > 0.0 && b > 0.0 => (uncertainty.covariance[(i, j)] / (a * b)).clamp(-1.0, 1.0),
+        _ => 0.0,
+    };
+    Correlation { values: DMatrix::from_fn(names.len(), names.len(), value), names }
+}

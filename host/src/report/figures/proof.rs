@@ -1,0 +1,59 @@
+//! Error before and after on lengths that the fit has not seen.
+
+use super::canvas::{AFTER, Axis, BEFORE, Failure, HEIGHT, Labels, WIDTH, chart, decades, draw, line, words};
+use super::table::{Table, number};
+use super::{Figure, FigureError};
+use crate::identify::Residual;
+use crate::report::facts::Facts;
+use crate::units::mm_from_m;
+
+const NAME: &str = "held-out";
+/// Errors below a tenth of a micrometre are drawn there.
+const SMALLEST_MM: f64 = 1e-4;
+
+pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
+    let Some(proof) = facts.proofs.first() else { return Ok(None) };
+    let (before_mm, after_mm) = (sorted_mm(&proof.before), sorted_mm(&proof.after));
+    let svg = draw(NAME, (WIDTH, HEIGHT), |area| {
+        let range = decades(before_mm.iter().chain(&after_mm).copied(), SMALLEST_MM);
+        let x = Axis { title: "error of a length, mm", range, labels: Labels::Powers };
+        let y = Axis { title: "% of lengths below", range: 0.0..100.0, labels: Labels::Numbers };
+        let mut chart = chart(area, "", &x, &y)?;
+        for (colour, values_mm, name, height) in [(BEFORE, &before_mm, "before", 12.0), (AFTER, &after_mm, "after", 24.0)] {
+            line(&mut chart, colour, steps(values_mm))?;
+            let left = x.range.start + 0.03 * (x.range.end - x.range.start);
+            words(&mut chart, colour, (left, 100.0 - height + 6.0), name)?;
+        }
+        Ok::<(), Failure>(())
+    })?;
+    let mut data = Table::new(["error_before_mm", "error_after_mm", "percent_below"]);
+    for (i, (before, after)) in before_mm.iter().zip(&after_mm).enumerate() {
+        data.row([number(*before), number(*after), number(percent(i, before_mm.len()))]);
+    }
+    let sentence = format!(
+        "On {}: half of the lengths are off by less than {:.3} mm after the fit, by {:.3} mm before; the further left the blue curve, \
+         the better.",
+        proof.name,
+        median(&after_mm),
+        median(&before_mm)
+    );
+    Ok(Some(Figure { name: NAME, title: "Error on lengths that the fit has not seen", sentence, svg, data, wide: false }))
+}
+
+fn sorted_mm(residuals: &[Residual]) -> Vec<f64> {
+    let mut sizes: Vec<f64> = residuals.iter().map(|f| mm_from_m(f.value_m.abs())).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes
+}
+
+fn median(sorted: &[f64]) -> f64 {
+    sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+}
+
+fn percent(rank: usize, of: usize) -> f64 {
+    100.0 * (rank + 1) as f64 / of as f64
+}
+
+fn steps(sorted_mm: &[f64]) -> Vec<(f64, f64)> {
+    sorted_mm.iter().enumerate().map(|(i, mm)| (mm.max(SMALLEST_MM).log10(), percent(i, sorted_mm.len()))).collect()
+}

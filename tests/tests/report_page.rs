@@ -1,0 +1,169 @@
+//! `host-cal report`: the page says what the other commands say, needs nothing else, and lets nobody's names in as HTML.
+
+mod shells;
+
+use std::fs;
+
+use ballbar::Kinematics;
+use ballbar_tests::command::host_cal_in;
+use ballbar_tests::experiment::Puma;
+use host_cal::files::{RIGS, ROBOTS};
+use host_cal::identify::{FitOptions, fit};
+use host_cal::report::{Facts, Inputs, figures};
+use host_cal::simulate::tool_error;
+use serde_json::Value;
+use shells::{DESIGN, puma, runs};
+use tempfile::TempDir;
+
+const REPORT: [&str; 4] = ["report", "poses.csv", "--out", "report.html"];
+const FIGURES: [&str; 10] = [
+    "held-out",
+    "shell",
+    "histogram",
+    "singular-values",
+    "convergence",
+    "workspace",
+    "pairings",
+    "time",
+    "joints",
+    "correlation",
+];
+
+fn page(folder: &TempDir) -> String {
+    fs::read_to_string(folder.path().join("report.html")).expect("a page")
+}
+
+fn facts_of(puma: &Puma, sigma_m: f64) -> (Facts, host_cal::files::Dataset, host_cal::identify::Fit) {
+    let dataset = puma.shells(0.46, 30, sigma_m, 3);
+    let fit = fit(&puma.design, &dataset, &FitOptions::default()).expect("enough poses");
+    let inputs =
+        Inputs { robot: &puma.design, rig: &puma.rig, dataset: &dataset, fit: &fit, unseen: &[], objection: None, remarks: &[] };
+    (Facts::new(&inputs), dataset, fit)
+}
+
+#[test]
+fn the_page_says_what_validate_says() {
+    let folder = puma();
+    let told = runs(&folder, &[&REPORT, &DESIGN, &["--validate", "other.csv", "--json"]]).json();
+    runs(&folder, &[&["fit", "poses.csv", "--out", "calibrated.toml"], &DESIGN]);
+    let by_validate =
+        runs(&folder, &[&["validate", "--robot", "calibrated.toml", "--rig", "triangles", "other.csv", "--json"]]).json();
+    assert_eq!(told["calibrated"], true);
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let rms_mm = number(&told["unseen"][0]["rms_mm"]);
+    assert!((rms_mm - number(&by_validate["rms_mm"])).abs() < 1e-6, "{told} {by_validate}");
+    let page = page(&folder);
+    assert!(page.contains("<h1>Calibrated</h1>"), "the first screen answers");
+    assert!(page.contains(&format!("<dd>{rms_mm:.3} mm</dd>")), "the first screen has {rms_mm}");
+}
+
+#[test]
+fn the_page_is_one_file_that_asks_for_no_other() {
+    let folder = puma();
+    runs(&folder, &[&REPORT, &DESIGN, &["--svg", "figures", "--csv", "figures"]]);
+    let page = page(&folder);
+    for foreign in ["http", "<script src", "<link", "@import", "url(", "<img", "<iframe"] {
+        assert!(!page.contains(foreign), "the page has `{foreign}`");
+    }
+    for name in FIGURES {
+        assert!(page.contains(&format!("<figure id=\"{name}\"")), "{name}");
+        let svg = fs::read_to_string(folder.path().join(format!("figures/{name}.svg"))).expect(name);
+        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && svg.contains("xmlns"), "{name}");
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
+        let csv = fs::read_to_string(folder.path().join(format!("figures/{name}.csv"))).expect(name);
+        let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+        assert!(columns.len() > 1 && columns.iter().all(|&count| count == columns[0]), "{name}: {columns:?}");
+    }
+    assert_eq!(page.matches("<svg").count(), FIGURES.len());
+}
+
+#[test]
+fn names_from_files_stay_text() {
+    const HOSTILE: &str = "</script><i onclick=alert(1)>&";
+    let folder = puma();
+    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).expect("a file");
+    let text_of = |list: &[(&str, &str)], name: &str| list.iter().find(|entry| entry.0 == name).expect("built in").1.to_owned();
+    let robot = text_of(&ROBOTS, "puma560");
+    let robot = robot.lines().filter(|line| !line.starts_with("name")).collect::<Vec<_>>().join("\n");
+    write("robot.toml", format!("name = \"{HOSTILE}\"\n{robot}\n"));
+    write("rig.toml", text_of(&RIGS, "triangles").replace("name = \"A\"", &format!("name = \"{HOSTILE}\"")));
+    let poses = fs::read_to_string(folder.path().join("poses.csv")).expect("poses");
+    write("<i>.csv", poses.replace("\nA,", &format!("\n{HOSTILE},")));
+    runs(&folder, &[&["report", "--robot", "robot.toml", "--rig", "rig.toml", "<i>.csv", "--out", "report.html"]]);
+    let page = page(&folder);
+    assert!(page.contains("&lt;/script&gt;&lt;i onclick=alert(1)&gt;&amp;"), "the name is shown");
+    assert!(!page.contains("<i"), "a name became an element");
+    assert_eq!(page.matches("</script>").count(), 2, "a name ended a script");
+}
+
+#[test]
+fn a_fit_that_other_lengths_speak_against_is_not_called_calibrated() {
+    let folder = puma();
+    let of_design =
+        ["simulate", "--robot", "puma560", "--rig", "triangles", "--bar", "460", "--per-pair", "5", "--sigma-mm", "0.05"];
+    runs(&folder, &[&of_design, &["--out", "design.csv"]]);
+    let run = host_cal_in(folder.path(), &[&REPORT[..], &DESIGN, &["--validate", "design.csv", "--json"]].concat());
+    assert_eq!(run.code, 1, "{}", run.transcript());
+    assert_eq!(run.json()["calibrated"], false);
+    assert!(page(&folder).contains("<h1>Not to be trusted as it is</h1>"));
+}
+
+#[test]
+fn without_noise_the_workspace_before_is_the_designs_error_and_after_is_none() {
+    let puma = Puma::default();
+    let (facts, _, _) = facts_of(&puma, 0.0);
+    let whole = tool_error(&puma.truth.chain, &puma.design.chain, &puma.truth.limits, 20_000, 1);
+    for points in [&facts.workspace.side, &facts.workspace.top] {
+        assert!(points.len() > 1_000, "{} points", points.len());
+        let largest = |of: fn(&host_cal::report::WorkspacePoint) -> f64| points.iter().map(of).fold(0.0, f64::max);
+        assert!(largest(|point| point.after_m) < 1e-6, "{}", largest(|point| point.after_m));
+        assert!(largest(|point| point.before_m) <= whole.max_m * 1.1 && largest(|point| point.before_m) > whole.rms_m);
+    }
+}
+
+#[test]
+fn the_error_predicted_after_is_about_the_error_there_is() {
+    let puma = Puma::default();
+    let (facts, _, fit) = facts_of(&puma, 84e-6);
+    let points: Vec<f64> = facts.workspace.side.iter().chain(&facts.workspace.top).map(|point| point.after_m).collect();
+    let predicted_m = (points.iter().map(|m| m * m).sum::<f64>() / points.len() as f64).sqrt();
+    let actual = tool_error(&puma.truth.chain, &fit.solution.chain, &puma.truth.limits, 20_000, 1);
+    let ratio = predicted_m / actual.rms_m;
+    assert!((0.5..2.0).contains(&ratio), "predicted {predicted_m}, actual {}", actual.rms_m);
+}
+
+#[test]
+fn longitude_latitude_and_length_lead_from_the_chuck_to_the_sphere() {
+    let puma = Puma::default();
+    let (facts, dataset, fit) = facts_of(&puma, 84e-6);
+    let kinematics = Kinematics::new(&fit.solution.chain);
+    for (row, fact) in dataset.rows.iter().zip(&facts.rows) {
+        let d = kinematics.length(&row.measurement.q, &row.measurement.pairing);
+        let (sin, cos) = fact.latitude_rad.sin_cos();
+        let bar = ballbar::Vector3::new(cos * fact.longitude_rad.cos(), cos * fact.longitude_rad.sin(), sin) * d;
+        assert!((row.measurement.pairing.chuck_base_m + bar - fact.sphere_m).norm() < 1e-12);
+        assert!((row.measurement.length_m - d - fact.after_m).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn left_out_residuals_are_those_of_the_cross_validation() {
+    let puma = Puma::default();
+    let (facts, _, fit) = facts_of(&puma, 84e-6);
+    let proof = facts.proofs.last().expect("enough poses");
+    let by_fit = fit.cross_validation.expect("enough poses");
+    assert!((proof.after_summary().rms_m - by_fit.rms_m).abs() < 1e-12);
+    assert!((proof.before_summary().rms_m - fit.initial.rms_m).abs() < 1e-12);
+}
+
+#[test]
+fn correlations_are_one_on_the_diagonal_and_symmetric() {
+    let (facts, _, _) = facts_of(&Puma::default(), 84e-6);
+    let values = &facts.correlation.values;
+    assert_eq!(values.nrows(), facts.free_parameters());
+    for i in 0..values.nrows() {
+        assert!((values[(i, i)] - 1.0).abs() < 1e-9);
+        assert!((0..i).all(|j| (values[(i, j)] - values[(j, i)]).abs() < 1e-9 && values[(i, j)].abs() <= 1.0));
+    }
+    assert_eq!(figures(&facts).expect("drawn").len(), FIGURES.len());
+}
