@@ -17,6 +17,7 @@ pub mod parameter_sets;
 pub mod peers;
 pub mod power_cut;
 pub mod raw_payload;
+pub mod readers;
 #[cfg(unix)]
 pub mod scenarios;
 #[cfg(unix)]
