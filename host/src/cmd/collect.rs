@@ -2,6 +2,7 @@
 
 mod mover;
 mod operator;
+mod picture;
 mod programs;
 mod report;
 mod session_files;
@@ -15,7 +16,6 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
-use super::live_line::LiveLine;
 use super::outcome::{CommandError, Outcome};
 use super::port::{EndRequest, PortArgs, StillnessArgs};
 use super::report::print;
@@ -31,7 +31,8 @@ use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run};
 use crate::units::m_from_mm;
 use mover::{Mover, MoverArgs};
-use operator::{Hand, KEYS, Terminal};
+use operator::{Hand, Terminal};
+use picture::Still;
 use programs::write_programs;
 use report::CollectReport;
 use session_files::SessionFiles;
@@ -43,7 +44,7 @@ use session_files::SessionFiles;
   host-cal collect /dev/ttyUSB0 --session today --robot-link sim --robot-address 127.0.0.1:7560
 
 A session that has begun needs no --plan, --robot and --rig: the same command goes on where it ended, after a crash or another day.
-At every change of the bar the command waits for Enter. Type and press Enter at any time:
+At every change of the bar the command waits for Enter. Keys at any time (with Enter, where it shows lines and no steady screen):
 e = erase the last pose, s = skip the next one, p = pause, r = resume, q = quit.")]
 pub(super) struct CollectArgs {
     #[command(flatten)]
@@ -171,7 +172,8 @@ impl CollectArgs {
         let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let board = BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
 
-        let mut terminal = Terminal::new(self.hand()?, files.robot.chain.joint_kinds(), EndRequest::listen());
+        let head = vec!["collect".into(), self.port.port.clone(), mover.name(), files.robot.name.clone()];
+        let mut terminal = Terminal::new(self.hand()?, Still::new(head, &files.robot), EndRequest::listen());
         let began = Instant::now();
         let mut collector = Collector::new(&cell, ledger, board, &mut terminal, options);
         let ended = match &mut mover {
@@ -179,7 +181,7 @@ impl CollectArgs {
             Mover::Programs(_) | Mover::Hand => collector.follow(self.nearness(), &guide),
         };
         let (summary, ledger, closed) = collector.end();
-        terminal.clear();
+        terminal.close();
         let mut report = CollectReport::new(&self.session, &files, &ledger, &summary, &ended, began.elapsed());
         let lag = remove_lag(&self.session, &files.robot, &files.rig);
         if let Ok(Some(lag)) = &lag {
@@ -232,10 +234,7 @@ impl CollectArgs {
         Ok(match self.mover.simulation()? {
             Some(address) => Hand::Sim(SimHand::connect(address)?),
             None if self.yes => Hand::Nobody,
-            None => {
-                LiveLine::new().note(KEYS);
-                Hand::Person
-            }
+            None => Hand::Person,
         })
     }
 

@@ -7,6 +7,7 @@ use ballbar::StillnessCriteria;
 use clap::Args;
 
 use super::outcome::CommandError;
+use super::screen::give_back;
 use crate::board::{BAUD, BoardLink};
 
 /// Which board.
@@ -54,16 +55,24 @@ pub(super) struct EndRequest(Arc<AtomicBool>);
 impl EndRequest {
     /// From here on Ctrl-C ends the work and not the program.
     pub(super) fn listen() -> Self {
-        let flag = Arc::new(AtomicBool::new(false));
-        let set = Arc::clone(&flag);
+        let request = Self(Arc::new(AtomicBool::new(false)));
+        let heard = request.clone();
         // A second handler is refused; the first one then ends the program as it always did.
-        let _ = ctrlc::set_handler(move || {
-            if set.swap(true, Ordering::Relaxed) {
-                // Asked twice: whatever the work waits for is not worth it.
-                std::process::exit(130);
-            }
-        });
-        Self(flag)
+        let _ = ctrlc::set_handler(move || heard.insist());
+        request
+    }
+
+    /// The user wants to end.
+    pub(super) fn make(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// The user wants to end; asked twice, whatever the work waits for is not worth it.
+    pub(super) fn insist(&self) {
+        if self.0.swap(true, Ordering::Relaxed) {
+            give_back();
+            std::process::exit(130);
+        }
     }
 
     pub(super) fn is_made(&self) -> bool {

@@ -2,6 +2,7 @@
 
 mod account;
 mod live;
+mod picture;
 mod watch;
 
 use std::path::PathBuf;
@@ -22,7 +23,7 @@ use crate::files::Rig;
 use crate::session::{Connection, Recorder, Run};
 use crate::units::{m_from_mm, mm_from_m};
 use account::Account;
-use live::Latest;
+use live::{Latest, Model};
 use watch::Watch;
 
 /// Watch a board: joint angles, length, losses; record a session
@@ -62,7 +63,7 @@ pub(super) struct StreamArgs {
     /// Length of the bar at mid travel, millimetres
     #[arg(long, value_name = "MM")]
     bar: Option<f64>,
-    /// rig.toml, or the built-in: triangles; checks the pairing and the bar
+    /// rig.toml, or the built-in: triangles; checks the pairing and the bar, and lets the screen show residuals
     #[arg(long)]
     rig: Option<String>,
     /// Temperature, kept with the session, degrees Celsius
@@ -136,7 +137,8 @@ impl StreamArgs {
             return Err(StreamError::NoParameters.into());
         }
         let recorder = self.recorder(&link, robot.as_ref(), connection)?;
-        let account = Account::new(robot.map(|(robot, _)| robot), recorder, self.bar, self.stillness.criteria());
+        let model = self.model(robot.as_ref().map(|(robot, _)| robot))?;
+        let account = Account::new(robot.map(|(robot, _)| robot), model, recorder, self.bar, self.stillness.criteria());
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
         let report = watch.finish()?;
@@ -185,6 +187,14 @@ impl StreamArgs {
             return Err(bad_pairing().into());
         }
         Ok(Some(Connection { chuck: chuck.into(), sphere: sphere.into(), bar_m: m_from_mm(bar_mm) }))
+    }
+
+    /// What computes lengths, when it is known what the bar joins and where.
+    fn model(&self, robot: Option<&RobotOnBoard>) -> Result<Option<Model>, CommandError> {
+        let (Some(rig), Some(pairing), Some(robot)) = (&self.rig, &self.pairing, robot) else { return Ok(None) };
+        let rig = Rig::open(rig)?;
+        let pairing = parse_pairings(pairing, &rig)?.first().map(|&id| rig.pairing(id));
+        Ok(pairing.and_then(|pairing| Model::new(robot, pairing)))
     }
 
     fn recorder(

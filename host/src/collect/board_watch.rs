@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{Answer, Command, Event, Status, Stream, StreamSelection, ToHost};
-use ballbar::{JointVector, Sample, SettledPose, StillnessCriteria};
+use ballbar::{JointVector, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria};
 
 use super::errors::CollectError;
 use super::track::TrackPoint;
@@ -23,6 +23,8 @@ pub struct View {
     pub is_homed: bool,
     /// Since when there is no bar within its travel, by the board's clock, microseconds.
     pub off_since_us: Option<u64>,
+    /// Whether the arm stands still.
+    pub stillness: Stillness,
 }
 
 /// A pose at which the arm stood still.
@@ -44,8 +46,14 @@ pub struct BoardWatch {
     robot: RobotOnBoard,
     recorder: Recorder,
     criteria: StillnessCriteria,
+    /// Follows the board's own detector.
+    detector: SettleDetector,
     period_us: u64,
     tally: StreamTally,
+    /// Time and index of the first sample.
+    first: Option<(u64, u32)>,
+    /// Index of the latest.
+    index: u32,
     view: Option<View>,
     stand: Option<Stand>,
     track: Option<Vec<TrackPoint>>,
@@ -75,10 +83,25 @@ impl BoardWatch {
         link.act(Command::SetRate { rate_hz })?;
         link.act(Command::SetStillness(criteria))?;
         link.start_stream(StreamSelection { samples: true, settled: true, poses: false })?;
-        let tally = StreamTally::default();
+        let (tally, detector) = (StreamTally::default(), SettleDetector::new(criteria));
         let (heard, period_us) = (Instant::now(), 1_000_000 / u64::from(rate_hz.max(1)));
-        let (view, stand, track, is_watchful) = (None, None, None, false);
-        Ok(Self { link, robot, recorder, criteria, period_us, tally, view, stand, track, is_watchful, heard })
+        let (first, index, view, stand, track, is_watchful) = (None, 0, None, None, None, false);
+        Ok(Self {
+            link,
+            robot,
+            recorder,
+            criteria,
+            detector,
+            period_us,
+            tally,
+            first,
+            index,
+            view,
+            stand,
+            track,
+            is_watchful,
+            heard,
+        })
     }
 
     /// The parameters that the board uses.
@@ -136,6 +159,17 @@ impl BoardWatch {
         self.view.as_ref()
     }
 
+    /// Samples a second so far, by the board's clock.
+    pub fn rate_hz(&self) -> Option<f64> {
+        let ((t0_us, first), view) = (self.first?, self.view?);
+        (view.t_us > t0_us).then(|| f64::from(self.index.wrapping_sub(first)) / ((view.t_us - t0_us) as f64 * 1e-6))
+    }
+
+    /// What was lost so far.
+    pub fn losses(&self) -> StreamLosses {
+        self.tally.losses()
+    }
+
     /// The latest pose at which the arm stood still, once.
     pub fn take_stand(&mut self) -> Option<Stand> {
         self.stand.take()
@@ -156,6 +190,7 @@ impl BoardWatch {
             displacement_m,
             is_homed: self.robot.is_homed_by(&status),
             off_since_us: displacement_m.is_none().then_some(status.uptime_us),
+            stillness: status.stillness,
         })
     }
 
@@ -167,6 +202,7 @@ impl BoardWatch {
     pub fn rearm(&mut self) -> Result<u64, CollectError> {
         let now_us = self.ask()?.t_us;
         self.link.act(Command::SetStillness(self.criteria))?;
+        self.detector.restart();
         self.stand = None;
         Ok(now_us)
     }
@@ -244,7 +280,11 @@ impl BoardWatch {
             Some(_) => None,
             None => self.view.and_then(|view| view.off_since_us).or(Some(sample.t_us)),
         };
-        self.view = Some(View { t_us: sample.t_us, q, displacement_m, is_homed, off_since_us });
+        self.detector.push(sample);
+        self.first.get_or_insert((sample.t_us, sample.index));
+        self.index = sample.index;
+        let stillness = self.detector.stillness();
+        self.view = Some(View { t_us: sample.t_us, q, displacement_m, is_homed, off_since_us, stillness });
         if let (Some(track), Some(displacement_m)) = (&mut self.track, displacement_m) {
             track.push(TrackPoint { t_s: sample.t_us as f64 * 1e-6, q, displacement_m });
         }

@@ -118,6 +118,8 @@ pub struct Collector<'a, 'o> {
     pub(super) summary: Summary,
     /// How the arm stood when rows were measured in this run.
     pub(super) stands: HashMap<usize, Stand>,
+    /// The row that the arm is to go to, or is at.
+    pub(super) goal: Option<usize>,
     missed_in_a_row: usize,
     rows_done: usize,
     began: Instant,
@@ -152,6 +154,7 @@ impl<'a, 'o> Collector<'a, 'o> {
             since_us,
             summary,
             stands,
+            goal: None,
             missed_in_a_row,
             rows_done: 0,
             began,
@@ -189,10 +192,10 @@ impl<'a, 'o> Collector<'a, 'o> {
     pub(super) fn listen(&mut self) -> Result<(), CollectError> {
         self.board.listen()?;
         if self.told.elapsed() > TELL
-            && let Some(view) = self.board.latest()
+            && let Some(now) = self.now()
         {
             self.told = Instant::now();
-            self.operator.tell(&Event::Now(view))?;
+            self.operator.tell(&Event::Now(&now))?;
         }
         Ok(())
     }
@@ -335,7 +338,7 @@ impl<'a, 'o> Collector<'a, 'o> {
             length_m: planned.bar_m + displacement_m,
             travel_left_m: self.board.travel_left_m(displacement_m),
             residual_m,
-            left: self.time_left(),
+            left: self.time_left().unwrap_or_default(),
         };
         Ok(self.operator.tell(&Event::Measured(&measured))?)
     }
@@ -368,10 +371,10 @@ impl<'a, 'o> Collector<'a, 'o> {
         Connection { chuck: rig.chucks[pairing.chuck].name.clone(), sphere: rig.spheres[pairing.sphere].name.clone(), bar_m }
     }
 
-    /// At the pace of this run.
-    fn time_left(&self) -> Duration {
+    /// At the pace of this run, once there is one.
+    pub(super) fn time_left(&self) -> Option<Duration> {
         let per_row = self.began.elapsed().div_f64(self.rows_done.max(1) as f64);
-        per_row.mul_f64(self.ledger.count(&RowState::Todo) as f64)
+        (self.rows_done > 0).then(|| per_row.mul_f64(self.ledger.count(&RowState::Todo) as f64))
     }
 
     /// The board's robot is the plan's, and knows where it is.

@@ -110,6 +110,7 @@ impl Collector<'_, '_> {
 
     fn tell_where(&mut self, row: usize) -> Result<(), CollectError> {
         let planned = &self.ledger.rows()[row];
+        self.goal = Some(row);
         Ok(self.operator.tell(&Event::Drive { line: planned.line, q: &planned.q })?)
     }
 

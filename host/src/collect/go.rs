@@ -76,6 +76,7 @@ impl Drive<'_, '_, '_, '_> {
     pub(super) fn go(&mut self, q: &JointVector<f64>, row: usize) -> Result<Go, CollectError> {
         let from = self.collector.board.ask()?;
         self.collector.since_us = from.t_us;
+        self.collector.goal = Some(row);
         let options = &self.collector.options;
         let speed = if matches!(self.collector.bar, Bar::On(_)) { options.speed } else { options.free_speed };
         self.robot.start_move(q, &speed)?;

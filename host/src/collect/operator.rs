@@ -74,8 +74,8 @@ pub enum Event<'a> {
     Trouble(&'a str),
     /// A pose was returned to; difference of the lengths, the encoders' difference taken out, metres.
     Repeated(f64),
-    /// How the arm stands now; often.
-    Now(&'a super::View),
+    /// How things stand now; often.
+    Now(&'a super::Now),
 }
 
 /// Who attaches the bar and may interfere.

@@ -1,4 +1,4 @@
-//! The operator at a terminal: lines in, lines out; and the hand of the simulation.
+//! The operator at a terminal: keys and a steady screen, or lines in and lines out; and the hand of the simulation.
 
 use std::io::{BufRead, stdin};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -6,16 +6,17 @@ use std::thread;
 
 use ballbar::JointKind;
 
-use crate::cmd::live_line::LiveLine;
+use super::picture::{Next, Still, picture};
 use crate::cmd::port::EndRequest;
-use crate::collect::{Event, Operator, View, Wish};
+use crate::cmd::screen::{Key, Screen};
+use crate::collect::{Event, Operator, Wish};
 use crate::robot_link::LinkError;
 use crate::robot_link::sim::{SimHand, SimRequest};
 use crate::session::Connection;
 use crate::units::{fixed, joints_text, mm_from_m, tidy};
 
-/// What the keys do, for the start of a run.
-pub(super) const KEYS: &str =
+/// What lines do that are typed, for the start of a run.
+const KEYS: &str =
     "Type and press Enter: nothing = done, e = erase last, s = skip, p = pause, r = resume, q = quit (Ctrl-C too).";
 
 /// Who attaches the bar.
@@ -31,25 +32,33 @@ pub(super) enum Hand {
 /// A person at the terminal, or none, with a hand.
 pub(super) struct Terminal {
     hand: Hand,
+    still: Still,
     kinds: Vec<JointKind>,
     end: EndRequest,
-    /// Lines typed.
-    lines: Receiver<String>,
-    line: LiveLine,
+    /// Lines typed, where there is no steady screen.
+    lines: Option<Receiver<String>>,
+    screen: Screen,
     /// A confirmation of what the hand did by itself.
     is_done: bool,
     /// A confirmation is waited for.
     is_asked: bool,
+    next: Next,
 }
 
 impl Terminal {
-    pub(super) fn new(hand: Hand, kinds: &[JointKind], end: EndRequest) -> Self {
-        let kinds = kinds.to_vec();
-        Self { hand, kinds, end, lines: typed_lines(), line: LiveLine::new(), is_done: false, is_asked: false }
+    pub(super) fn new(hand: Hand, still: Still, end: EndRequest) -> Self {
+        let mut screen = Screen::open(&end);
+        if matches!(hand, Hand::Person) && !screen.is_steady() {
+            screen.note(KEYS);
+        }
+        let lines = (!screen.is_steady()).then(typed_lines);
+        let (kinds, next) = (still.kinds(), Next::default());
+        Self { hand, still, kinds, end, lines, screen, is_done: false, is_asked: false, next }
     }
 
-    pub(super) fn clear(&self) {
-        self.line.clear();
+    /// Gives the terminal back.
+    pub(super) fn close(&mut self) {
+        self.screen.close();
     }
 
     fn attach(&mut self, bar: Option<&Connection>) -> Result<(), LinkError> {
@@ -72,15 +81,8 @@ impl Terminal {
 
     fn ask(&mut self, what: &str, bar: String) {
         let ending = if matches!(self.hand, Hand::Person) { ". Enter when done." } else { "" };
-        self.line.note(&format!("{what} {bar}{ending}"));
-    }
-
-    fn show(&mut self, view: &View) {
-        let kinds = &self.kinds;
-        self.line.draw(|| {
-            let bar = view.displacement_m.map_or("no bar within its travel".into(), |m| format!("bar {:+.3} mm", mm_from_m(m)));
-            format!("{}  {bar}", joints_text(kinds, view.q.as_array()))
-        });
+        self.screen.note(&format!("{what} {bar}{ending}"));
+        self.next = Next::Bar(format!("{what} {bar}"));
     }
 }
 
@@ -95,14 +97,22 @@ impl Operator for Terminal {
                 self.ask("Take off", bar.map_or("the bar, if it is on".into(), words));
                 self.attach(None)?;
             }
-            Event::Attached(bar) => self.line.note(&format!("attached: {}", words(bar))),
+            Event::Attached(bar) => self.screen.note(&format!("attached: {}", words(bar))),
             Event::Drive { line, q } => {
-                self.line.note(&format!("line {line}: drive to {}", joints_text(&self.kinds, q.as_array())));
+                self.screen.note(&format!("line {line}: drive to {}", joints_text(&self.kinds, q.as_array())));
+                self.next = Next::Drive { line: *line };
             }
-            Event::Start(program) => self.line.note(&format!("start the program {program} at the robot's controller")),
+            Event::Start(program) => {
+                let words = format!("start the program {program} at the robot's controller");
+                self.screen.note(&words);
+                self.next = Next::Start(words);
+            }
             Event::Measured(pose) => {
+                if let Next::Drive { .. } = self.next {
+                    self.next = Next::Nothing;
+                }
                 let [inwards, outwards] = pose.travel_left_m.map(|m| fixed(mm_from_m(m), 1));
-                self.line.note(&format!(
+                self.screen.note(&format!(
                     "{}/{} line {}: {} mm, {inwards} | {outwards} mm left, residual {:+.3} mm, {} to go",
                     pose.done,
                     pose.all,
@@ -112,17 +122,24 @@ impl Operator for Terminal {
                     indicatif::HumanDuration(pose.left),
                 ));
             }
-            Event::Missed { line, why } => self.line.note(&format!("line {line}: NOT MEASURED: {why}")),
-            Event::Done(wish) => self.line.note(match wish {
-                Wish::EraseLast => "the last pose is erased",
-                Wish::Skip => "a pose is skipped",
-                Wish::Pause => "paused; r and Enter to go on",
-                Wish::Resume => "going on",
-                Wish::Confirm | Wish::Quit => "",
-            }),
-            Event::Trouble(words) => self.line.note(words),
-            Event::Repeated(m) => self.line.note(&format!("a pose returned to: {:+.4} mm", mm_from_m(*m))),
-            Event::Now(view) => self.show(view),
+            Event::Missed { line, why } => self.screen.note(&format!("line {line}: NOT MEASURED: {why}")),
+            Event::Done(wish) => {
+                self.still.is_paused = *wish == Wish::Pause || self.still.is_paused && *wish != Wish::Resume;
+                self.screen.note(match wish {
+                    Wish::EraseLast => "the last pose is erased",
+                    Wish::Skip => "a pose is skipped",
+                    Wish::Pause if self.screen.is_steady() => "paused",
+                    Wish::Pause => "paused; r and Enter to go on",
+                    Wish::Resume => "going on",
+                    Wish::Confirm | Wish::Quit => "",
+                });
+            }
+            Event::Trouble(words) => self.screen.note(words),
+            Event::Repeated(m) => self.screen.note(&format!("a pose returned to: {:+.4} mm", mm_from_m(*m))),
+            Event::Now(now) => {
+                let (still, next, is_asked) = (&self.still, &self.next, self.is_asked);
+                self.screen.draw(|| picture(still, now, next, is_asked));
+            }
         }
         Ok(())
     }
@@ -134,31 +151,39 @@ impl Operator for Terminal {
         if std::mem::take(&mut self.is_done) {
             return Some(Wish::Confirm);
         }
-        match self.lines.try_recv() {
-            Ok(line) => self.read(&line),
-            Err(TryRecvError::Empty) => None,
+        let typed = match self.lines.as_ref().map(Receiver::try_recv) {
+            None => match self.screen.key()? {
+                Key::Enter => String::new(),
+                Key::Letter(letter) => letter.to_string(),
+            },
+            Some(Ok(line)) => line,
             // Nobody is there any more: nobody can attach the bar.
-            Err(TryRecvError::Disconnected) if self.is_asked => Some(Wish::Quit),
-            Err(TryRecvError::Disconnected) => None,
-        }
+            Some(Err(TryRecvError::Disconnected)) if self.is_asked => return Some(Wish::Quit),
+            Some(Err(_)) => return None,
+        };
+        self.read(&typed)
     }
 }
 
 impl Terminal {
-    fn read(&mut self, line: &str) -> Option<Wish> {
-        let wish = match line.trim().to_ascii_lowercase().as_str() {
+    fn read(&mut self, typed: &str) -> Option<Wish> {
+        let wish = match typed.trim().to_ascii_lowercase().as_str() {
             "" | "ok" | "y" => Wish::Confirm,
             "e" => Wish::EraseLast,
             "s" => Wish::Skip,
             "p" => Wish::Pause,
             "r" => Wish::Resume,
             "q" => Wish::Quit,
+            _ if self.screen.is_steady() => return None,
             other => {
-                self.line.note(&format!("`{other}` is no key. {KEYS}"));
+                self.screen.note(&format!("`{other}` is no key. {KEYS}"));
                 return None;
             }
         };
-        self.is_asked &= wish != Wish::Confirm;
+        if wish == Wish::Confirm && self.is_asked {
+            self.is_asked = false;
+            self.next = Next::Nothing;
+        }
         Some(wish)
     }
 }

@@ -1,9 +1,9 @@
 //! What came of a stream so far: counts, losses, the latest values, and the recording.
 
 use ballbar::wire::{Event, Status, Stream, ToHost};
-use ballbar::{JointVector, SettledPose, StillnessCriteria};
+use ballbar::{JointVector, SettleDetector, SettledPose, StillnessCriteria};
 
-use super::live::Latest;
+use super::live::{Latest, Model};
 use super::record_error;
 use super::watch::RobotAndFrame;
 use crate::board::{Frame, RobotOnBoard, StreamTally};
@@ -14,6 +14,8 @@ use crate::units::mm_from_m;
 /// The books of one run.
 pub(super) struct Account {
     pub(super) robot: Option<RobotOnBoard>,
+    /// What computes lengths, where that can be.
+    model: Option<Model>,
     pub(super) recorder: Option<Recorder>,
     pub(super) bar_mm: Option<f64>,
     pub(super) tally: StreamTally,
@@ -25,10 +27,13 @@ pub(super) struct Account {
     /// Settled poses that were not written because not every encoder was homed.
     pub(super) withheld: u64,
     pub(super) gaps: u64,
+    /// Whether all encoders of the joints were homed, as of the latest message.
+    pub(super) is_homed: Option<bool>,
     /// The pose that was written last, when the port was lost since: an arm that still stands there settles again.
     doubtful: Option<SettledPose>,
     last_written: Option<SettledPose>,
-    criteria: StillnessCriteria,
+    /// Follows the board's own, where samples come.
+    detector: SettleDetector,
     /// Time and index of the first and the latest sample since the port was last lost.
     clock: Option<[(u64, u32); 2]>,
 }
@@ -36,18 +41,20 @@ pub(super) struct Account {
 impl Account {
     pub(super) fn new(
         robot: Option<RobotOnBoard>,
+        model: Option<Model>,
         recorder: Option<Recorder>,
         bar_mm: Option<f64>,
         criteria: StillnessCriteria,
     ) -> Self {
         Self {
             robot,
+            model,
             recorder,
             bar_mm,
             withheld: 0,
             doubtful: None,
             last_written: None,
-            criteria,
+            detector: SettleDetector::new(criteria),
             tally: StreamTally::default(),
             latest: Latest::default(),
             samples: 0,
@@ -55,6 +62,7 @@ impl Account {
             tool_poses: 0,
             written: 0,
             gaps: 0,
+            is_homed: None,
             clock: None,
         }
     }
@@ -66,16 +74,19 @@ impl Account {
             recorder.frame(&frame.bytes).map_err(record_error)?;
         }
         self.tally.take(stream);
+        self.is_homed = self.robot.as_ref().map(|robot| robot.is_homed(stream.homed));
         match &stream.event {
             Event::Samples(batch) => {
                 self.samples += batch.len() as u64;
                 for sample in batch.samples() {
                     let now = (sample.t_us, sample.index);
                     self.clock = Some([self.clock.map_or(now, |[first, _]| first), now]);
+                    self.detector.push(&sample);
                     if sample.index == batch.first.index.wrapping_add(batch.rest.len() as u32) {
                         self.latest.take_sample(&sample, self.robot.as_ref(), self.bar_mm);
                     }
                 }
+                self.latest.take_stillness(self.detector.stillness());
                 Ok(None)
             }
             Event::Settled(pose) => self.take_settled(pose, stream).map(Some),
@@ -98,6 +109,7 @@ impl Account {
         self.gaps += 1;
         self.tally.interrupt();
         self.clock = None;
+        self.detector.restart();
         self.doubtful = self.last_written.take().or(self.doubtful.take());
         self.recorder.as_mut().map_or(Ok(()), Recorder::lost).map_err(record_error)
     }
@@ -108,6 +120,24 @@ impl Account {
         recorder.back().map_err(record_error)?;
         recorder.frame(hello_frame).map_err(record_error)?;
         robot.map_or(Ok(()), |(_, frame)| recorder.frame(frame)).map_err(record_error)
+    }
+
+    /// Messages and samples lost.
+    pub(super) fn lost(&self) -> u64 {
+        let losses = self.tally.losses();
+        losses.missing + losses.overruns
+    }
+
+    /// Measured less computed length, millimetres, where both are known.
+    pub(super) fn residual_mm(&self) -> Option<f64> {
+        Some(self.latest.length_mm? - self.model.as_ref()?.length_mm(self.latest.q.as_ref()?)?)
+    }
+
+    /// How things stand, in a line.
+    pub(super) fn text(&self) -> String {
+        let kinds = self.robot.as_ref().map_or(&[][..], RobotOnBoard::kinds);
+        let rate = self.rate_hz().map_or(String::new(), |hz| format!("{hz:.0} Hz  "));
+        format!("{rate}settled {}  lost {}  {}", self.settled, self.lost(), self.latest.text(kinds))
     }
 
     /// Samples a second by the board's clock.
@@ -154,7 +184,7 @@ impl Account {
             self.withheld += 1;
             return Ok("; not written, because the encoders are NOT HOMED: host-cal home PORT --q …");
         }
-        if self.doubtful.take().is_some_and(|before| is_same_stand(&before, pose, &self.criteria)) {
+        if self.doubtful.take().is_some_and(|before| is_same_stand(&before, pose, &self.detector.criteria())) {
             self.last_written = Some(pose.clone());
             return Ok("; still where the last pose was written: not written again");
         }

@@ -1,8 +1,8 @@
 //! What is known of the arm at this moment, in numbers and in a line.
 
 use ballbar::wire::{Status, StreamedPose};
-use ballbar::{JointKind, LvdtReading, Sample, Stillness};
-use serde::Serialize;
+use ballbar::{Chain, JointKind, Kinematics, LvdtReading, Pairing, Sample, Stillness};
+use serde::{Serialize, Serializer};
 
 use crate::board::RobotOnBoard;
 use crate::units::{ScreenUnit, fixed, joints_text, mm_from_m};
@@ -26,8 +26,31 @@ pub(super) struct Latest {
     pub(super) travel_left_mm: Option<[f64; 2]>,
     /// The tool's origin in the base frame.
     pub(super) position_mm: Option<[f64; 3]>,
-    /// moving, settling or settled, as far as the board has said.
-    pub(super) stillness: Option<&'static str>,
+    /// moving, settling or settled, as far as is known.
+    #[serde(serialize_with = "in_words")]
+    pub(super) stillness: Option<Stillness>,
+}
+
+/// Computes the length that the board's parameters expect.
+pub(super) struct Model {
+    chain: Chain<f64>,
+    pairing: Pairing<f64>,
+}
+
+impl Model {
+    /// `None` when the board's parameters make no chain.
+    pub(super) fn new(robot: &RobotOnBoard, pairing: Pairing<f64>) -> Option<Self> {
+        let parameters: Vec<f64> = robot.set().parameters.iter().map(|&value| f64::from(value)).collect();
+        let chain = Chain::new(robot.kinds(), &parameters).ok()?;
+        Some(Self { chain, pairing })
+    }
+
+    /// Millimetres, at joint values in degrees or millimetres.
+    pub(super) fn length_mm(&self, q: &[f64]) -> Option<f64> {
+        let si: Vec<f64> = self.chain.joint_kinds().iter().zip(q).map(|(&kind, &q)| ScreenUnit::from(kind).to_si(q)).collect();
+        let q = self.chain.joint_vector(&si).ok()?;
+        Some(mm_from_m(Kinematics::new(&self.chain).length(&q, &self.pairing)))
+    }
 }
 
 impl Latest {
@@ -40,11 +63,11 @@ impl Latest {
         let counts: Vec<i32> = status.encoders.iter().map(|encoder| encoder.counts).collect();
         self.t_s = Some(status.uptime_us as f64 * 1e-6);
         self.take_channels(&counts, status.lvdt, robot, bar_mm);
-        self.stillness = Some(match status.stillness {
-            Stillness::Moving => "moving",
-            Stillness::Settling => "settling",
-            Stillness::Settled => "settled",
-        });
+        self.take_stillness(status.stillness);
+    }
+
+    pub(super) fn take_stillness(&mut self, stillness: Stillness) {
+        self.stillness = Some(stillness);
     }
 
     pub(super) fn take_pose(&mut self, pose: &StreamedPose) {
@@ -82,7 +105,19 @@ impl Latest {
         });
         parts.extend(self.travel_left_mm.map(|[inwards, outwards]| format!("{inwards:.1} | {outwards:.1} mm left")));
         parts.extend(self.position_mm.map(|[x, y, z]| format!("tool {x:.3} {y:.3} {z:.3} mm")));
-        parts.extend(self.stillness.map(str::to_owned));
+        parts.extend(self.stillness.map(|stillness| word(stillness).to_owned()));
         parts.join("  ")
     }
+}
+
+fn word(stillness: Stillness) -> &'static str {
+    match stillness {
+        Stillness::Moving => "moving",
+        Stillness::Settling => "settling",
+        Stillness::Settled => "settled",
+    }
+}
+
+fn in_words<S: Serializer>(stillness: &Option<Stillness>, serializer: S) -> Result<S::Ok, S::Error> {
+    stillness.map(word).serialize(serializer)
 }

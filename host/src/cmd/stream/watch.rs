@@ -7,11 +7,12 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use super::account::Account;
+use super::picture::picture;
 use super::{FrameLine, StreamArgs, StreamReport, record_error};
 use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
-use crate::cmd::live_line::LiveLine;
 use crate::cmd::outcome::CommandError;
 use crate::cmd::port::EndRequest;
+use crate::cmd::screen::{Key, Screen};
 use crate::session::BoardDescription;
 
 /// One run of `stream`.
@@ -20,7 +21,7 @@ pub(super) struct Watch<'a> {
     link: Link,
     account: Account,
     end: EndRequest,
-    line: LiveLine,
+    screen: Screen,
     began: Instant,
     /// When the board last said anything.
     heard: Instant,
@@ -54,8 +55,9 @@ const RETRY: Duration = Duration::from_millis(300);
 impl<'a> Watch<'a> {
     pub(super) fn new(link: BoardLink, args: &'a StreamArgs, account: Account) -> Self {
         let now = Instant::now();
-        let (end, line) = (EndRequest::listen(), LiveLine::new());
-        Self { args, link: Link::Up(Box::new(link)), account, end, line, began: now, heard: now }
+        let end = EndRequest::listen();
+        let screen = Screen::open(&end);
+        Self { args, link: Link::Up(Box::new(link)), account, end, screen, began: now, heard: now }
     }
 
     /// Until the time is over, the poses are there, or the user has had enough.
@@ -64,6 +66,7 @@ impl<'a> Watch<'a> {
             self.args.start(link)?;
         }
         while !self.is_done() {
+            self.show();
             let Link::Up(link) = &mut self.link else {
                 self.wait_for_port()?;
                 continue;
@@ -72,7 +75,7 @@ impl<'a> Watch<'a> {
                 Ok(Some(frame)) => {
                     self.heard = Instant::now();
                     if let Some(settled) = self.account.take(&frame)? {
-                        self.line.note(&settled);
+                        self.screen.note(&settled);
                     }
                     None
                 }
@@ -87,14 +90,13 @@ impl<'a> Watch<'a> {
             if let Some(reason) = lost {
                 self.lose(&reason)?;
             }
-            self.show();
         }
         Ok(())
     }
 
     /// Ends the stream and the session, and says what came of it.
     pub(super) fn finish(mut self) -> Result<StreamReport, CommandError> {
-        self.line.clear();
+        self.screen.close();
         if let Link::Up(link) = &mut self.link {
             // What the board had gathered comes before its answer. A board that is gone by now needs no end.
             let _ = link.act(Command::StopStream);
@@ -140,19 +142,23 @@ impl<'a> Watch<'a> {
             || self.args.poses.is_some_and(|poses| self.account.settled >= poses)
     }
 
+    /// Shows how things stand, and hears the keys.
     fn show(&mut self) {
-        let account = &self.account;
-        let kinds = account.robot.as_ref().map_or(&[][..], RobotOnBoard::kinds);
-        let losses = account.tally.losses();
-        self.line.show(|| {
-            let rate = account.rate_hz().map_or(String::new(), |hz| format!("{hz:.0} Hz  "));
-            let head = format!("{rate}settled {}  lost {}", account.settled, losses.missing + losses.overruns);
-            format!("{head}  {}", account.latest.text(kinds))
-        });
+        if self.screen.key() == Some(Key::Letter('q')) {
+            self.end.make();
+        }
+        let (account, args, began) = (&self.account, self.args, self.began);
+        match &self.link {
+            Link::Up(link) => {
+                self.screen.draw(|| picture(args, Some(link), account, began.elapsed()));
+                self.screen.say(|| account.text());
+            }
+            Link::Lost { .. } => self.screen.draw(|| picture(args, None, account, began.elapsed())),
+        }
     }
 
     fn lose(&mut self, reason: &str) -> Result<(), CommandError> {
-        self.line.note(&format!("{}: the board is away: {reason}; waiting for it", self.args.port.port));
+        self.screen.note(&format!("{}: the board is away: {reason}; waiting for it", self.args.port.port));
         self.account.lose()?;
         if let Link::Up(link) = &self.link {
             let lost = Link::Lost { hello: Box::new(link.hello().clone()), frames: link.frame_counts().into() };
@@ -172,7 +178,7 @@ impl<'a> Watch<'a> {
                 if link.hello().uptime_us < self.began.elapsed().as_micros() as u64 {
                     note += "; it was started anew, so its encoders are NOT HOMED unless somebody has done so since";
                 }
-                self.line.note(&note);
+                self.screen.note(&note);
                 self.link = Link::Up(Box::new(link));
                 self.heard = Instant::now();
             }

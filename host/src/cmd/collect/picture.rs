@@ -1,0 +1,106 @@
+//! What the steady screen of `collect` shows.
+
+use std::time::Instant;
+
+use ballbar::{JointKind, Stillness};
+
+use crate::cmd::screen::{Bar, Joint, Picture, Poses};
+use crate::collect::Now;
+use crate::files::Robot;
+use crate::units::{ScreenUnit, mm_from_m, tidy};
+
+/// What changes little during a run.
+pub(super) struct Still {
+    /// The command, the port, the board, the robot.
+    head: Vec<String>,
+    /// Kind and limits of each joint, in the units of the screen.
+    joints: Vec<(JointKind, [f64; 2])>,
+    began: Instant,
+    /// The operator has paused the run.
+    pub(super) is_paused: bool,
+}
+
+/// What the person has to do, as far as anybody has said.
+#[derive(Debug, Default)]
+pub(super) enum Next {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// See to the bar.
+    Bar(String),
+    /// Drive the robot to where the arrows point.
+    Drive { line: usize },
+    /// Start a program.
+    Start(String),
+}
+
+const KEYS: &[(&str, &str)] =
+    &[("Enter", "done"), ("e", "erase the last pose"), ("s", "skip the next"), ("p", "pause"), ("r", "resume"), ("q", "quit")];
+
+impl Still {
+    pub(super) fn new(head: Vec<String>, robot: &Robot) -> Self {
+        let limits = |(&kind, limits): (&JointKind, &crate::files::JointLimits)| {
+            let unit = ScreenUnit::from(kind);
+            (kind, [unit.from_si(limits.min), unit.from_si(limits.max)])
+        };
+        let joints = robot.chain.joint_kinds().iter().zip(&robot.limits).map(limits).collect();
+        Self { head, joints, began: Instant::now(), is_paused: false }
+    }
+
+    pub(super) fn kinds(&self) -> Vec<JointKind> {
+        self.joints.iter().map(|&(kind, _)| kind).collect()
+    }
+}
+
+/// The picture of a moment; `is_asked` when the run waits for a confirmation.
+pub(super) fn picture(still: &Still, now: &Now, next: &Next, is_asked: bool) -> Picture {
+    let joint = |(i, &(kind, limits)): (usize, &(JointKind, [f64; 2]))| {
+        let unit = ScreenUnit::from(kind);
+        let goal = now.goal.map(|goal| unit.from_si(goal.q.as_array()[i]));
+        Joint { limits: Some(limits), goal, ..Joint::new(kind, unit.from_si(now.view.q.as_array()[i])) }
+    };
+    let displacement_m = now.view.displacement_m;
+    let joined = now.joined.as_ref();
+    let name = joined.map(|bar| format!("{}:{}, {} mm", bar.chuck, bar.sphere, tidy(mm_from_m(bar.bar_m))));
+    let (least_m, most_m) = now.travel_m;
+    Picture {
+        head: still.head.clone(),
+        elapsed: still.began.elapsed(),
+        joints: still.joints.iter().enumerate().map(joint).collect(),
+        bar: Bar {
+            name,
+            length_mm: joined.zip(displacement_m).map(|(bar, m)| mm_from_m(bar.bar_m + m)),
+            displacement_mm: displacement_m.map(mm_from_m),
+            travel_mm: Some([mm_from_m(least_m), mm_from_m(most_m)]),
+            code: None,
+        },
+        tool_mm: None,
+        rate_hz: now.rate_hz,
+        lost: now.losses.missing + now.losses.overruns,
+        stillness: Some(now.view.stillness),
+        is_homed: Some(now.view.is_homed),
+        residual_mm: now.residual_m.map(mm_from_m),
+        poses: Poses { done: now.done as u64, of: Some(now.all as u64), left: now.left },
+        next: words(still, now, next, is_asked),
+        is_waiting: is_asked || still.is_paused,
+        keys: KEYS,
+    }
+}
+
+fn words(still: &Still, now: &Now, next: &Next, is_asked: bool) -> String {
+    match next {
+        _ if still.is_paused => "paused: r to go on".into(),
+        Next::Bar(words) if is_asked => format!("{words}, then press Enter"),
+        Next::Drive { line } => {
+            format!("drive the robot to line {line} of the plan, where the joints' marks are, and let it stand still")
+        }
+        Next::Start(words) => words.clone(),
+        Next::Nothing | Next::Bar(_) => match now.goal {
+            Some(goal) if now.view.stillness == Stillness::Moving => {
+                format!("the robot goes to line {} of the plan: stay clear", goal.line)
+            }
+            Some(goal) => format!("line {} of the plan is measured: stay clear", goal.line),
+            None => "nothing to do: stay clear of the robot".into(),
+        },
+    }
+}

@@ -1,0 +1,99 @@
+//! What a person sees of a run that goes on: a steady screen on a terminal, lines elsewhere.
+
+mod gauge;
+mod layout;
+mod picture;
+mod terminal;
+#[cfg(test)]
+mod tests;
+
+use std::io::{IsTerminal, Write, stderr, stdin};
+use std::time::{Duration, Instant};
+
+pub(super) use picture::{Bar, Joint, Picture, Poses};
+use terminal::Terminal;
+pub(super) use terminal::{Key, give_back};
+
+use super::port::EndRequest;
+
+/// The steady screen, or lines on stderr.
+pub(super) struct Screen {
+    terminal: Option<Terminal>,
+    /// The latest of what was noted, for the steady screen.
+    notes: Vec<String>,
+    shown: Instant,
+}
+
+const REDRAW: Duration = Duration::from_millis(100);
+const SAY: Duration = Duration::from_secs(1);
+/// More notes than any window is high.
+const KEPT_NOTES: usize = 200;
+/// Notes that are said again when the steady screen is gone.
+const LAST_NOTES: usize = 10;
+
+impl Screen {
+    /// A steady screen needs a terminal at both ends: one to draw on and one to take keys from.
+    pub(super) fn open(end: &EndRequest) -> Self {
+        let is_dumb = std::env::var_os("TERM").is_some_and(|name| name == "dumb");
+        let is_terminal = stderr().is_terminal() && stdin().is_terminal() && !is_dumb;
+        // A terminal that cannot be taken still shows lines.
+        let terminal = is_terminal.then(|| Terminal::take(end.clone())).and_then(Result::ok);
+        Self { terminal, notes: Vec::new(), shown: Instant::now() }
+    }
+
+    /// Whether keys are heard, and a picture seen.
+    pub(super) fn is_steady(&self) -> bool {
+        self.terminal.is_some()
+    }
+
+    /// The next key that was pressed; none without a steady screen.
+    pub(super) fn key(&self) -> Option<Key> {
+        self.terminal.as_ref()?.key()
+    }
+
+    /// Draws the picture, when it is time to and there is a steady screen.
+    pub(super) fn draw(&mut self, picture: impl FnOnce() -> Picture) {
+        if let Some(terminal) = &mut self.terminal
+            && self.shown.elapsed() >= REDRAW
+        {
+            self.shown = Instant::now();
+            terminal.draw(&picture(), &self.notes);
+        }
+    }
+
+    /// Says how things stand, when it is time to and there is no steady screen.
+    pub(super) fn say(&mut self, line: impl FnOnce() -> String) {
+        if self.terminal.is_none() && self.shown.elapsed() >= SAY {
+            self.shown = Instant::now();
+            say(&line());
+        }
+    }
+
+    /// Says something that stays.
+    pub(super) fn note(&mut self, text: &str) {
+        if self.terminal.is_none() {
+            return say(text);
+        }
+        self.notes.extend(text.lines().map(str::to_owned));
+        let surplus = self.notes.len().saturating_sub(KEPT_NOTES);
+        self.notes.drain(..surplus);
+    }
+
+    /// Gives the terminal back, and says the latest notes again.
+    pub(super) fn close(&mut self) {
+        if self.terminal.take().is_some() {
+            let first = self.notes.len().saturating_sub(LAST_NOTES);
+            self.notes.drain(..).skip(first).for_each(|note| say(&note));
+        }
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+fn say(text: &str) {
+    let _ = writeln!(stderr(), "{text}");
+}

@@ -1,0 +1,72 @@
+//! What the steady screen of `stream` shows.
+
+use std::time::Duration;
+
+use super::StreamArgs;
+use super::account::Account;
+use crate::board::{BoardLink, RobotOnBoard};
+use crate::cmd::screen::{Bar, Joint, Picture, Poses};
+use crate::units::mm_from_m;
+
+/// The picture of a moment; without a link, of a board that is away.
+pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Account, elapsed: Duration) -> Picture {
+    let (latest, robot) = (&account.latest, account.robot.as_ref());
+    let mut head = vec!["stream".to_owned(), args.port.port.clone()];
+    head.extend(link.map(|link| format!("{} {}", link.hello().board, link.hello().firmware)));
+    head.extend(robot.map(|robot| robot.set().name.as_str().to_owned()));
+    let joints = match (&latest.q, robot) {
+        (Some(q), Some(robot)) => robot.kinds().iter().zip(q).map(|(&kind, &q)| Joint::new(kind, q)).collect(),
+        _ => latest.counts.iter().map(|&counts| Joint::of_counts(counts)).collect(),
+    };
+    let travel_mm = robot.map(|robot| {
+        let (least_m, most_m) = robot.set().lvdt.travel_m::<f64>();
+        [mm_from_m(least_m), mm_from_m(most_m)]
+    });
+    let name = args.pairing.as_ref().zip(args.bar).map(|(pairing, bar_mm)| format!("{pairing}, {bar_mm} mm"));
+    Picture {
+        head,
+        elapsed,
+        joints,
+        bar: Bar {
+            name,
+            length_mm: latest.length_mm,
+            displacement_mm: latest.displacement_mm,
+            travel_mm,
+            code: latest.code.filter(|_| robot.is_none()),
+        },
+        tool_mm: latest.position_mm,
+        rate_hz: account.rate_hz(),
+        lost: account.lost(),
+        stillness: latest.stillness,
+        is_homed: account.is_homed,
+        residual_mm: account.residual_mm(),
+        poses: Poses { done: account.settled, of: args.poses, left: args.time.map(|time| time.saturating_sub(elapsed)) },
+        next: next(args, link.is_some(), account, robot),
+        is_waiting: link.is_none(),
+        keys: &[("q", "end"), ("Ctrl-C", "end")],
+    }
+}
+
+fn next(args: &StreamArgs, is_there: bool, account: &Account, robot: Option<&RobotOnBoard>) -> String {
+    if !is_there {
+        return "the board is away: plug it in again; what was recorded is kept".into();
+    }
+    let port = &args.port.port;
+    if robot.is_none() {
+        return format!("the board knows no robot: end, and host-cal apply {port} --robot robot.toml --uncalibrated");
+    }
+    if account.is_homed == Some(false) {
+        return format!("bring the arm to a known pose, end, and host-cal home {port} --q …");
+    }
+    if !args.selection().settled {
+        return "watch".into();
+    }
+    if account.latest.displacement_mm.is_none() {
+        return "attach the bar, or move the arm until the bar is within its travel".into();
+    }
+    match account.latest.stillness {
+        Some(ballbar::Stillness::Settled) => "the pose is taken: move the arm to the next one".into(),
+        Some(ballbar::Stillness::Settling) => "hold still".into(),
+        _ => "move the arm to a pose, and let it stand still".into(),
+    }
+}
