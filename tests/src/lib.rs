@@ -23,4 +23,6 @@ pub mod scenarios;
 #[cfg(unix)]
 pub mod simulated_cell;
 pub mod solids;
+#[cfg(unix)]
+pub mod terminal;
 pub mod wire_schema;

@@ -40,8 +40,9 @@ pub(super) struct Terminal {
     screen: Screen,
     /// A confirmation of what the hand did by itself.
     is_done: bool,
-    /// A confirmation is waited for.
-    is_asked: bool,
+    /// What the person was asked to do with the bar, until it is confirmed.
+    asked: Option<String>,
+    /// What the person does with the robot.
     next: Next,
 }
 
@@ -53,7 +54,7 @@ impl Terminal {
         }
         let lines = (!screen.is_steady()).then(typed_lines);
         let (kinds, next) = (still.kinds(), Next::default());
-        Self { hand, still, kinds, end, lines, screen, is_done: false, is_asked: false, next }
+        Self { hand, still, kinds, end, lines, screen, is_done: false, asked: None, next }
     }
 
     /// Gives the terminal back.
@@ -63,7 +64,7 @@ impl Terminal {
 
     fn attach(&mut self, bar: Option<&Connection>) -> Result<(), LinkError> {
         match &mut self.hand {
-            Hand::Person => self.is_asked = true,
+            Hand::Person => {}
             Hand::Nobody => self.is_done = true,
             Hand::Sim(hand) => {
                 let request = match bar {
@@ -80,9 +81,12 @@ impl Terminal {
     }
 
     fn ask(&mut self, what: &str, bar: String) {
-        let ending = if matches!(self.hand, Hand::Person) { ". Enter when done." } else { "" };
-        self.screen.note(&format!("{what} {bar}{ending}"));
-        self.next = Next::Bar(format!("{what} {bar}"));
+        let words = format!("{what} {bar}");
+        if !matches!(self.hand, Hand::Person) {
+            return self.screen.note(&words);
+        }
+        self.screen.note(&format!("{words}. Enter when done."));
+        self.asked = Some(words);
     }
 }
 
@@ -108,9 +112,7 @@ impl Operator for Terminal {
                 self.next = Next::Start(words);
             }
             Event::Measured(pose) => {
-                if let Next::Drive { .. } = self.next {
-                    self.next = Next::Nothing;
-                }
+                self.next = Next::Nothing;
                 let [inwards, outwards] = pose.travel_left_m.map(|m| fixed(mm_from_m(m), 1));
                 self.screen.note(&format!(
                     "{}/{} line {}: {} mm, {inwards} | {outwards} mm left, residual {:+.3} mm, {} to go",
@@ -137,8 +139,8 @@ impl Operator for Terminal {
             Event::Trouble(words) => self.screen.note(words),
             Event::Repeated(m) => self.screen.note(&format!("a pose returned to: {:+.4} mm", mm_from_m(*m))),
             Event::Now(now) => {
-                let (still, next, is_asked) = (&self.still, &self.next, self.is_asked);
-                self.screen.draw(|| picture(still, now, next, is_asked));
+                let (still, next, asked) = (&self.still, &self.next, self.asked.as_deref());
+                self.screen.draw(|| picture(still, now, next, asked));
             }
         }
         Ok(())
@@ -158,7 +160,7 @@ impl Operator for Terminal {
             },
             Some(Ok(line)) => line,
             // Nobody is there any more: nobody can attach the bar.
-            Some(Err(TryRecvError::Disconnected)) if self.is_asked => return Some(Wish::Quit),
+            Some(Err(TryRecvError::Disconnected)) if self.asked.is_some() => return Some(Wish::Quit),
             Some(Err(_)) => return None,
         };
         self.read(&typed)
@@ -180,9 +182,8 @@ impl Terminal {
                 return None;
             }
         };
-        if wish == Wish::Confirm && self.is_asked {
-            self.is_asked = false;
-            self.next = Next::Nothing;
+        if wish == Wish::Confirm {
+            self.asked = None;
         }
         Some(wish)
     }

@@ -20,14 +20,12 @@ pub(super) struct Still {
     pub(super) is_paused: bool,
 }
 
-/// What the person has to do, as far as anybody has said.
+/// What the person does with the robot, as far as anybody has said.
 #[derive(Debug, Default)]
 pub(super) enum Next {
     /// Nothing.
     #[default]
     Nothing,
-    /// See to the bar.
-    Bar(String),
     /// Drive the robot to where the arrows point.
     Drive { line: usize },
     /// Start a program.
@@ -52,8 +50,8 @@ impl Still {
     }
 }
 
-/// The picture of a moment; `is_asked` when the run waits for a confirmation.
-pub(super) fn picture(still: &Still, now: &Now, next: &Next, is_asked: bool) -> Picture {
+/// The picture of a moment; `asked` is what has to be confirmed before anything goes on.
+pub(super) fn picture(still: &Still, now: &Now, next: &Next, asked: Option<&str>) -> Picture {
     let joint = |(i, &(kind, limits)): (usize, &(JointKind, [f64; 2]))| {
         let unit = ScreenUnit::from(kind);
         let goal = now.goal.map(|goal| unit.from_si(goal.q.as_array()[i]));
@@ -81,21 +79,25 @@ pub(super) fn picture(still: &Still, now: &Now, next: &Next, is_asked: bool) -> 
         is_homed: Some(now.view.is_homed),
         residual_mm: now.residual_m.map(mm_from_m),
         poses: Poses { done: now.done as u64, of: Some(now.all as u64), left: now.left },
-        next: words(still, now, next, is_asked),
-        is_waiting: is_asked || still.is_paused,
+        next: words(still, now, next, asked),
+        is_waiting: asked.is_some() || still.is_paused,
         keys: KEYS,
     }
 }
 
-fn words(still: &Still, now: &Now, next: &Next, is_asked: bool) -> String {
+fn words(still: &Still, now: &Now, next: &Next, asked: Option<&str>) -> String {
+    if still.is_paused {
+        return "paused: r to go on".into();
+    }
+    if let Some(asked) = asked {
+        return format!("{asked}, then press Enter");
+    }
     match next {
-        _ if still.is_paused => "paused: r to go on".into(),
-        Next::Bar(words) if is_asked => format!("{words}, then press Enter"),
         Next::Drive { line } => {
             format!("drive the robot to line {line} of the plan, where the joints' marks are, and let it stand still")
         }
         Next::Start(words) => words.clone(),
-        Next::Nothing | Next::Bar(_) => match now.goal {
+        Next::Nothing => match now.goal {
             Some(goal) if now.view.stillness == Stillness::Moving => {
                 format!("the robot goes to line {} of the plan: stay clear", goal.line)
             }

@@ -116,9 +116,14 @@ fn draw_panels(frame: &mut Frame<'_>, panels: Vec<Panel<'_>>, room: Rect) {
 fn head(picture: &Picture, width: u16) -> Line<'static> {
     let seconds = picture.elapsed.as_secs();
     let clock = format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60);
-    let words = picture.head.join("  ");
     let room = usize::from(width).saturating_sub(clock.len() + 1);
-    let words: String = words.chars().take(room).collect();
+    let mut words = String::new();
+    for word in &picture.head {
+        let longer = if words.is_empty() { word.clone() } else { format!("{words}  {word}") };
+        if longer.chars().count() <= room {
+            words = longer;
+        }
+    }
     Line::from(vec![Span::from(format!("{words:room$} ")).style(Modifier::BOLD), clock.into()])
 }
 
@@ -165,7 +170,9 @@ fn facts(picture: &Picture) -> Vec<Span<'static>> {
     let good = Style::from(Color::Green);
     let bad = Style::from(Color::Red).add_modifier(Modifier::BOLD);
     let mut facts = Vec::new();
-    facts.extend(picture.stillness.map(|stillness| match stillness {
+    // Without a bar within its travel nothing settles, however still the arm stands.
+    let is_measuring = picture.bar.displacement_mm.is_some() || picture.bar.code.is_some();
+    facts.extend(picture.stillness.filter(|_| is_measuring).map(|stillness| match stillness {
         Stillness::Moving => Span::from("moving").style(Color::Yellow),
         Stillness::Settling => Span::from("settling").style(Color::Yellow),
         Stillness::Settled => Span::from("settled").style(good),

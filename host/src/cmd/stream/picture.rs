@@ -43,7 +43,7 @@ pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Acc
         poses: Poses { done: account.settled, of: args.poses, left: args.time.map(|time| time.saturating_sub(elapsed)) },
         next: next(args, link.is_some(), account, robot),
         is_waiting: link.is_none(),
-        keys: &[("q", "end"), ("Ctrl-C", "end")],
+        keys: &[("q", "end")],
     }
 }
 
