@@ -3,7 +3,9 @@
 use std::io::{Read, Write};
 use std::num::NonZero;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
@@ -15,10 +17,13 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A run of `host-cal` at a terminal.
 pub struct AtTerminal {
-    master: Box<dyn MasterPty + Send>,
-    keyboard: Box<dyn Write + Send>,
+    master: Option<Box<dyn MasterPty + Send>>,
+    keyboard: Option<Box<dyn Write + Send>>,
     child: Box<dyn Child + Send + Sync>,
     screen: Arc<Mutex<vt100::Parser>>,
+    /// Reads what is shown, until the terminal is closed at the other end or by `is_hung_up`.
+    reader: Option<JoinHandle<()>>,
+    is_hung_up: Arc<AtomicBool>,
     /// How the terminal was before.
     modes: String,
 }
@@ -49,14 +54,15 @@ impl AtTerminal {
         let keyboard = pair.master.take_writer().expect("a keyboard");
         let mut output = pair.master.try_clone_reader().expect("a screen");
         let screen = Arc::new(Mutex::new(vt100::Parser::new(rows(size), columns(size), 500)));
-        let shown = Arc::clone(&screen);
-        std::thread::spawn(move || {
+        let is_hung_up = Arc::new(AtomicBool::new(false));
+        let (shown, is_over) = (Arc::clone(&screen), Arc::clone(&is_hung_up));
+        let reader = std::thread::spawn(move || {
             let mut bytes = [0; 4096];
-            while let Ok(count @ 1..) = output.read(&mut bytes) {
+            while let (Ok(count @ 1..), false) = (output.read(&mut bytes), is_over.load(Ordering::Relaxed)) {
                 shown.lock().expect("no panic at the screen").process(&bytes[..count]);
             }
         });
-        Self { master: pair.master, keyboard, child, screen, modes }
+        Self { master: Some(pair.master), keyboard: Some(keyboard), child, screen, reader: Some(reader), is_hung_up, modes }
     }
 
     /// What the window shows.
@@ -80,12 +86,23 @@ impl AtTerminal {
         }
     }
 
+    /// Waits until a whole frame is drawn that shows something: until it is there, and nothing changes any more but numbers.
+    ///
+    /// # Panics
+    /// When it does not come.
+    pub fn wait_for_frame(&mut self, what: &str) {
+        self.wait_for(what);
+        std::thread::sleep(Duration::from_millis(400));
+        self.wait_for(what);
+    }
+
     /// Presses keys.
     ///
     /// # Panics
     /// When the terminal is gone.
     pub fn press(&mut self, keys: &str) {
-        self.keyboard.write_all(keys.as_bytes()).and_then(|()| self.keyboard.flush()).expect("a keyboard");
+        let keyboard = self.keyboard.as_mut().expect("not hung up");
+        keyboard.write_all(keys.as_bytes()).and_then(|()| keyboard.flush()).expect("a keyboard");
     }
 
     /// Makes the window larger or smaller.
@@ -94,7 +111,7 @@ impl AtTerminal {
     /// When the terminal is gone.
     pub fn resize(&mut self, size: (u16, u16)) {
         self.screen.lock().expect("no panic at the screen").screen_mut().set_size(rows(size), columns(size));
-        self.master.resize(pty_size(size)).expect("a window");
+        self.master.as_ref().expect("not hung up").resize(pty_size(size)).expect("a window");
     }
 
     /// Sends a signal, as `kill` names it.
@@ -120,21 +137,45 @@ impl AtTerminal {
     /// # Panics
     /// When it does not end, or leaves the terminal otherwise than it was.
     pub fn finish(mut self) -> (u32, String) {
-        let began = Instant::now();
-        let status = loop {
-            match self.child.try_wait().expect("a child") {
-                Some(status) => break status,
-                None if began.elapsed() > PATIENCE => panic!("it does not end; the window shows\n{}", self.text()),
-                None => std::thread::sleep(Duration::from_millis(20)),
-            }
-        };
-        // What was written last is still on its way to the screen.
-        std::thread::sleep(Duration::from_millis(200));
+        let code = self.wait_for_end();
+        // The terminal is closed at the other end now: the reader ends when all is shown.
+        self.reader.take().map(JoinHandle::join).expect("not hung up").expect("no panic at the screen");
         let screen = self.screen.lock().expect("no panic at the screen");
         assert!(!screen.screen().alternate_screen(), "the steady screen was left on");
         assert!(!screen.screen().hide_cursor(), "the cursor was left off");
-        assert_eq!(modes(self.master.as_ref()), self.modes, "the terminal's modes were changed");
-        (status.exit_code(), screen.screen().contents())
+        let now = modes(self.master.as_ref().expect("not hung up").as_ref());
+        assert_eq!(now, self.modes, "the terminal's modes were changed");
+        (code, screen.screen().contents())
+    }
+
+    /// Closes the window, as a lost connection does, and waits for the end. The exit code.
+    ///
+    /// # Panics
+    /// When it does not end.
+    pub fn hang_up(mut self) -> u32 {
+        self.is_hung_up.store(true, Ordering::Relaxed);
+        // The reader notices with the next frame: there is one every second at least.
+        self.reader.take().map(JoinHandle::join).expect("not hung up before").expect("no panic at the screen");
+        (self.keyboard, self.master) = (None, None);
+        self.wait_for_end()
+    }
+
+    fn wait_for_end(&mut self) -> u32 {
+        let began = Instant::now();
+        loop {
+            match self.child.try_wait().expect("a child") {
+                Some(status) => return status.exit_code(),
+                None if began.elapsed() > PATIENCE => panic!("it does not end; the window shows\n{}", self.text()),
+                None => std::thread::sleep(Duration::from_millis(20)),
+            }
+        }
+    }
+}
+
+impl Drop for AtTerminal {
+    /// A test that failed leaves nothing behind.
+    fn drop(&mut self) {
+        let _ = self.child.kill();
     }
 }
 

@@ -7,6 +7,7 @@ use std::path::Path;
 use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, design, plant};
 use ballbar_tests::terminal::AtTerminal;
 use host_cal::board::parameter_set;
+use host_cal::session::Description;
 use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions, driver};
 
 const WIDE: (u16, u16) = (100, 24);
@@ -42,11 +43,11 @@ fn stream_keeps_its_screen_in_any_window_until_ctrl_c() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let _board = board(folder.path());
     let mut run = AtTerminal::start(folder.path(), &["stream", "port"], WIDE);
-    run.wait_for("1000 Hz");
+    run.wait_for_frame("1000 Hz");
     assert!(run.is_steady());
     snapshot("stream_wide", &run.text());
     run.resize((40, 20));
-    run.wait_for("and host-cal home port");
+    run.wait_for_frame("and host-cal home port");
     snapshot("stream_narrow", &run.text());
     run.resize((5, 2));
     std::thread::sleep(std::time::Duration::from_millis(300));
@@ -77,6 +78,29 @@ fn whatever_ends_a_run_the_terminal_is_sane_afterwards() {
 }
 
 #[test]
+fn a_window_that_is_closed_ends_the_run_and_the_session_whole() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let _board = board(folder.path());
+    let mut run = AtTerminal::start(folder.path(), &["stream", "port", "--session", "session"], WIDE);
+    run.wait_for("1000 Hz");
+    // No result can be printed any more.
+    assert_eq!(run.hang_up(), 3);
+    let description = Description::read(&folder.path().join("session")).expect("a session");
+    assert!(description.runs[0].ended.is_some());
+}
+
+#[test]
+fn a_sequence_broken_off_keeps_nothing_from_being_heard() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let _board = board(folder.path());
+    let mut run = AtTerminal::start(folder.path(), &["stream", "port"], WIDE);
+    run.wait_for("1000 Hz");
+    run.press("\u{1b}[");
+    run.press("\u{3}");
+    assert_eq!(run.finish().0, 0);
+}
+
+#[test]
 fn a_lost_port_is_shown_and_can_be_left() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let board = board(folder.path());
@@ -88,6 +112,29 @@ fn a_lost_port_is_shown_and_can_be_left() {
     let (code, text) = run.finish();
     assert_eq!(code, 1, "{text}");
     assert!(text.contains("the port was lost 1 times"), "{text}");
+}
+
+#[test]
+fn a_port_lost_while_collecting_leaves_the_reason_on_a_sane_terminal() {
+    let mut cell = SimulatedCell::start(plant(1), 0.0, &SHORT_PLAN);
+    let mut run = collect(&cell, "sim");
+    run.wait_for("2 of 24 poses");
+    let other = board(&cell.path(""));
+    drop(std::mem::replace(&mut cell.board, other));
+    let (code, text) = run.finish();
+    assert_eq!(code, 2, "{text}");
+    assert!(text.contains("port") && text.contains("The same command goes on."), "{text}");
+}
+
+#[test]
+fn without_samples_the_board_is_asked_how_it_is() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let _board = board(folder.path());
+    let mut run = AtTerminal::start(folder.path(), &["stream", "port", "--settled", "--pose"], WIDE);
+    run.wait_for("NOT HOMED");
+    run.wait_for("6      0.000°");
+    run.press("q");
+    assert_eq!(run.finish().0, 0);
 }
 
 #[test]
@@ -125,11 +172,11 @@ fn collect_asks_for_the_bar_and_for_the_place() {
     let (_driver, driven) = driver();
     let cell = SimulatedCell::driven_by_hand(plant(1), driven, &SHORT_PLAN);
     let mut run = collect(&cell, "manual");
-    run.wait_for("> Take off the bar, if it is on, then press Enter");
+    run.wait_for_frame("> Take off the bar, if it is on, then press Enter");
     snapshot("collect_by_hand", &run.text());
     run.press("\r");
     run.wait_for("line 2: drive to");
-    run.wait_for("> Attach the bar A:1, 460 mm, then press Enter");
+    run.wait_for("then Attach the bar A:1");
     run.press("\r");
     run.wait_for("the LVDT shows no bar within its travel");
     run.press("\u{3}");

@@ -49,13 +49,18 @@ impl StillnessArgs {
 }
 
 /// Whether the user wants to end: set by Ctrl-C and by the signals that ask a program to end.
-#[derive(Clone)]
-pub(super) struct EndRequest(Arc<AtomicBool>);
+#[derive(Clone, Default)]
+pub(super) struct EndRequest {
+    /// By whatever means.
+    is_made: Arc<AtomicBool>,
+    /// By Ctrl-C or a signal.
+    is_insisted: Arc<AtomicBool>,
+}
 
 impl EndRequest {
     /// From here on Ctrl-C ends the work and not the program.
     pub(super) fn listen() -> Self {
-        let request = Self(Arc::new(AtomicBool::new(false)));
+        let request = Self::default();
         let heard = request.clone();
         // A second handler is refused; the first one then ends the program as it always did.
         let _ = ctrlc::set_handler(move || heard.insist());
@@ -64,18 +69,19 @@ impl EndRequest {
 
     /// The user wants to end.
     pub(super) fn make(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.is_made.store(true, Ordering::Relaxed);
     }
 
     /// The user wants to end; asked twice, whatever the work waits for is not worth it.
     pub(super) fn insist(&self) {
-        if self.0.swap(true, Ordering::Relaxed) {
+        self.make();
+        if self.is_insisted.swap(true, Ordering::Relaxed) {
             give_back();
             std::process::exit(130);
         }
     }
 
     pub(super) fn is_made(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.is_made.load(Ordering::Relaxed)
     }
 }

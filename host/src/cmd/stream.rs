@@ -136,9 +136,9 @@ impl StreamArgs {
         if robot.is_none() && (connection.is_some() || self.pose) {
             return Err(StreamError::NoParameters.into());
         }
-        let recorder = self.recorder(&link, robot.as_ref(), connection)?;
+        let recorder = self.recorder(&link, robot.as_ref(), connection.clone())?;
         let model = self.model(robot.as_ref().map(|(robot, _)| robot))?;
-        let account = Account::new(robot.map(|(robot, _)| robot), model, recorder, self.bar, self.stillness.criteria());
+        let account = Account::new(robot.map(|(robot, _)| robot), model, recorder, connection, self.stillness.criteria());
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
         let report = watch.finish()?;

@@ -100,7 +100,8 @@ impl Collector<'_, '_> {
             match self.operator.wish() {
                 Some(Wish::Confirm | Wish::Resume) => return Ok(false),
                 Some(Wish::Quit) => return Ok(true),
-                _ => {}
+                Some(later) => self.wishes.push_back(later),
+                None => {}
             }
         }
     }

@@ -112,7 +112,7 @@ pub struct Collector<'a, 'o> {
     pub(super) options: CollectOptions,
     pub(super) bar: Bar,
     /// Wishes that came while none could be carried out.
-    wishes: VecDeque<Wish>,
+    pub(super) wishes: VecDeque<Wish>,
     /// Time of the board at which the latest move began: what stood still before is no measurement of this place.
     pub(super) since_us: u64,
     pub(super) summary: Summary,
@@ -252,16 +252,19 @@ impl<'a, 'o> Collector<'a, 'o> {
     /// Waits for the operator. True when the run is to end.
     fn pause(&mut self) -> Result<bool, CollectError> {
         self.operator.tell(&Event::Done(Wish::Pause))?;
+        let mut later = Vec::new();
         loop {
             self.listen()?;
             match self.wishes.pop_front().or_else(|| self.operator.wish()) {
                 Some(Wish::Resume | Wish::Confirm) => {
                     self.operator.tell(&Event::Done(Wish::Resume))?;
+                    self.wishes.extend(later);
                     return Ok(false);
                 }
                 Some(Wish::Quit) => return Ok(true),
                 Some(Wish::EraseLast) => self.erase_last()?,
-                _ => {}
+                Some(Wish::Skip) => later.push(Wish::Skip),
+                Some(Wish::Pause) | None => {}
             }
         }
     }

@@ -47,6 +47,7 @@ impl Collector<'_, '_> {
                     if self.wait_near(shell.start.saturating_sub(1)..=shell.start)? {
                         return Ok(Ended::Quit);
                     }
+                    self.goal = Some(first);
                     self.operator.tell(&Event::Start(&programs.approach))?;
                 }
             }
@@ -67,6 +68,7 @@ impl Collector<'_, '_> {
     fn follow_shell(&mut self, shell: &Range<usize>, near: Nearness, by_hand: bool) -> Result<bool, CollectError> {
         let mut told = self.todo(shell);
         while let Some(target) = self.todo(shell) {
+            self.goal = Some(target);
             if by_hand && told != Some(target) {
                 told = Some(target);
                 self.tell_where(target)?;

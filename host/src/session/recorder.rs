@@ -1,5 +1,6 @@
 //! Takes what a board streams into a session's files.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -12,6 +13,7 @@ use super::description::{Description, DescriptionError, Run};
 use super::log::{LogError, LogWriter, unix_ms};
 use super::pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 use super::{LOG_NAME, POSES_NAME};
+use crate::units::{mm_from_m, tidy};
 
 /// Why a recording cannot begin or go on.
 #[derive(Debug, Error, Diagnostic)]
@@ -50,6 +52,13 @@ pub struct Connection {
     pub sphere: String,
     /// Length of the bar at mid travel, metres.
     pub bar_m: f64,
+}
+
+impl fmt::Display for Connection {
+    /// `A:1, 460 mm`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}, {} mm", self.chuck, self.sphere, tidy(mm_from_m(self.bar_m)))
+    }
 }
 
 /// A pose to keep.

@@ -13,7 +13,7 @@ use crate::collect::{Event, Operator, Wish};
 use crate::robot_link::LinkError;
 use crate::robot_link::sim::{SimHand, SimRequest};
 use crate::session::Connection;
-use crate::units::{fixed, joints_text, mm_from_m, tidy};
+use crate::units::{fixed, joints_text, mm_from_m};
 
 /// What lines do that are typed, for the start of a run.
 const KEYS: &str =
@@ -86,6 +86,8 @@ impl Terminal {
             return self.screen.note(&words);
         }
         self.screen.note(&format!("{words}. Enter when done."));
+        // Pressed before it was asked: meant for something else, or held down.
+        self.screen.forget(Key::Enter);
         self.asked = Some(words);
     }
 }
@@ -157,6 +159,7 @@ impl Operator for Terminal {
             None => match self.screen.key()? {
                 Key::Enter => String::new(),
                 Key::Letter(letter) => letter.to_string(),
+                Key::End => return Some(Wish::Quit),
             },
             Some(Ok(line)) => line,
             // Nobody is there any more: nobody can attach the bar.
@@ -182,7 +185,7 @@ impl Terminal {
                 return None;
             }
         };
-        if wish == Wish::Confirm {
+        if matches!(wish, Wish::Confirm | Wish::Resume) {
             self.asked = None;
         }
         Some(wish)
@@ -206,5 +209,5 @@ fn typed_lines() -> Receiver<String> {
 }
 
 fn words(bar: &Connection) -> String {
-    format!("the bar {}:{}, {} mm", bar.chuck, bar.sphere, tidy(mm_from_m(bar.bar_m)))
+    format!("the bar {bar}")
 }

@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-use ballbar::{JointKind, Stillness};
+use ballbar::JointKind;
 
 use crate::cmd::screen::{Bar, Joint, Picture, Poses};
 use crate::collect::Now;
 use crate::files::Robot;
-use crate::units::{ScreenUnit, mm_from_m, tidy};
+use crate::units::{ScreenUnit, mm_from_m};
 
 /// What changes little during a run.
 pub(super) struct Still {
@@ -59,14 +59,13 @@ pub(super) fn picture(still: &Still, now: &Now, next: &Next, asked: Option<&str>
     };
     let displacement_m = now.view.displacement_m;
     let joined = now.joined.as_ref();
-    let name = joined.map(|bar| format!("{}:{}, {} mm", bar.chuck, bar.sphere, tidy(mm_from_m(bar.bar_m))));
     let (least_m, most_m) = now.travel_m;
     Picture {
         head: still.head.clone(),
         elapsed: still.began.elapsed(),
         joints: still.joints.iter().enumerate().map(joint).collect(),
         bar: Bar {
-            name,
+            name: joined.map(ToString::to_string),
             length_mm: joined.zip(displacement_m).map(|(bar, m)| mm_from_m(bar.bar_m + m)),
             displacement_mm: displacement_m.map(mm_from_m),
             travel_mm: Some([mm_from_m(least_m), mm_from_m(most_m)]),
@@ -80,7 +79,7 @@ pub(super) fn picture(still: &Still, now: &Now, next: &Next, asked: Option<&str>
         residual_mm: now.residual_m.map(mm_from_m),
         poses: Poses { done: now.done as u64, of: Some(now.all as u64), left: now.left },
         next: words(still, now, next, asked),
-        is_waiting: asked.is_some() || still.is_paused,
+        is_waiting: asked.is_some() || still.is_paused || !matches!(next, Next::Nothing),
         keys: KEYS,
     }
 }
@@ -89,20 +88,18 @@ fn words(still: &Still, now: &Now, next: &Next, asked: Option<&str>) -> String {
     if still.is_paused {
         return "paused: r to go on".into();
     }
-    if let Some(asked) = asked {
-        return format!("{asked}, then press Enter");
-    }
-    match next {
-        Next::Drive { line } => {
-            format!("drive the robot to line {line} of the plan, where the joints' marks are, and let it stand still")
-        }
-        Next::Start(words) => words.clone(),
-        Next::Nothing => match now.goal {
-            Some(goal) if now.view.stillness == Stillness::Moving => {
-                format!("the robot goes to line {} of the plan: stay clear", goal.line)
-            }
-            Some(goal) => format!("line {} of the plan is measured: stay clear", goal.line),
-            None => "nothing to do: stay clear of the robot".into(),
+    let robot = match next {
+        Next::Nothing => None,
+        Next::Drive { line } => Some(format!("drive the robot to line {line} of the plan, to the values behind the arrows")),
+        Next::Start(words) => Some(words.clone()),
+    };
+    match (robot, asked) {
+        (Some(robot), Some(asked)) => format!("{robot}; then {asked}, and press Enter"),
+        (Some(robot), None) => format!("{robot}, and let it stand still"),
+        (None, Some(asked)) => format!("{asked}, then press Enter"),
+        (None, None) => match now.goal {
+            Some(goal) => format!("the robot is at line {} of the plan: stay clear", goal.line),
+            None => "stay clear of the robot".into(),
         },
     }
 }

@@ -14,6 +14,8 @@ use crate::units::fixed;
 
 /// Narrower windows have the bar under the joints.
 const SIDE_BY_SIDE: u16 = 76;
+/// Lines of the panels' borders, of the facts and of what to do next.
+const OTHER_LINES: usize = 5;
 /// Shorter gauges tell nothing.
 const GAUGE: usize = 13;
 
@@ -40,7 +42,7 @@ struct Panel<'a> {
 /// Draws a picture, and the latest notes below it.
 pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture, notes: &[String]) {
     let area = frame.area();
-    let parts = fitting(parts(picture, area.width), area.height);
+    let parts = fitting(parts(picture, area), area.height);
     let heights = parts.iter().map(|part| match part.content {
         Content::Notes => Constraint::Min(part.height),
         _ => Constraint::Length(part.height),
@@ -75,9 +77,10 @@ fn fitting(parts: Vec<Part<'_>>, height: u16) -> Vec<Part<'_>> {
     parts.into_iter().zip(has_room).filter_map(|(part, has_room)| has_room.then_some(part)).collect()
 }
 
-fn parts(picture: &Picture, width: u16) -> Vec<Part<'_>> {
+fn parts(picture: &Picture, Rect { width, height, .. }: Rect) -> Vec<Part<'_>> {
     let lines = |rank, lines: Vec<Line<'static>>| Part { rank, height: lines.len() as u16, content: Content::Lines(lines) };
-    let is_wide = width >= SIDE_BY_SIDE;
+    // In a low window the bar is kept longer than the joints, so it has a place of its own.
+    let is_wide = width >= SIDE_BY_SIDE && usize::from(height) >= picture.joints.len() + OTHER_LINES;
     let inner = if is_wide { width / 2 } else { width }.saturating_sub(4);
     let joints = Panel { title: "Joints".into(), lines: joint_lines(&picture.joints, inner) };
     let name = picture.bar.name.as_ref().map_or("Bar".to_owned(), |name| format!("Bar {name}"));
@@ -187,6 +190,7 @@ fn facts(picture: &Picture) -> Vec<Span<'static>> {
     facts.push(picture.residual_mm.map_or("residual –".into(), |mm| format!("residual {mm:+.3} mm").into()));
     if picture.poses.of.is_none() {
         facts.push(format!("{} poses", picture.poses.done).into());
+        facts.extend(picture.poses.left.map(|left| format!("{} left", HumanDuration(left)).into()));
     }
     facts
 }

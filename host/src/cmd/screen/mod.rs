@@ -1,6 +1,8 @@
 //! What a person sees of a run that goes on: a steady screen on a terminal, lines elsewhere.
 
 mod gauge;
+mod keyboard;
+mod keys;
 mod layout;
 mod picture;
 mod terminal;
@@ -10,9 +12,10 @@ mod tests;
 use std::io::{IsTerminal, Write, stderr, stdin};
 use std::time::{Duration, Instant};
 
+pub(super) use keys::Key;
 pub(super) use picture::{Bar, Joint, Picture, Poses};
 use terminal::Terminal;
-pub(super) use terminal::{Key, give_back};
+pub(super) use terminal::give_back;
 
 use super::port::EndRequest;
 
@@ -47,8 +50,15 @@ impl Screen {
     }
 
     /// The next key that was pressed; none without a steady screen.
-    pub(super) fn key(&self) -> Option<Key> {
-        self.terminal.as_ref()?.key()
+    pub(super) fn key(&mut self) -> Option<Key> {
+        self.terminal.as_mut()?.key()
+    }
+
+    /// Forgets every press of a key so far: it was not meant for what is asked now.
+    pub(super) fn forget(&mut self, key: Key) {
+        if let Some(terminal) = &mut self.terminal {
+            terminal.forget(key);
+        }
     }
 
     /// Draws the picture, when it is time to and there is a steady screen.
@@ -69,12 +79,13 @@ impl Screen {
         }
     }
 
-    /// Says something that stays.
+    /// Says something that stays. What a board or a controller said moves no cursor.
     pub(super) fn note(&mut self, text: &str) {
+        let lines = text.lines().map(|line| line.replace(char::is_control, ""));
         if self.terminal.is_none() {
-            return say(text);
+            return lines.for_each(|line| say(&line));
         }
-        self.notes.extend(text.lines().map(str::to_owned));
+        self.notes.extend(lines);
         let surplus = self.notes.len().saturating_sub(KEPT_NOTES);
         self.notes.drain(..surplus);
     }

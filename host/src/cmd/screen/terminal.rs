@@ -1,39 +1,36 @@
 //! The terminal while a steady screen has it, and how it is given back.
 
-use std::io::{Stderr, stderr};
-use std::sync::Arc;
-use std::sync::Once;
+use std::collections::VecDeque;
+use std::io::{Write, stderr};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, Once, TryLockError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::cursor::Show;
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::crossterm::execute;
 use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
 
+use super::keyboard::Keyboard;
+use super::keys::Key;
 use super::layout;
 use super::picture::Picture;
 use crate::cmd::port::EndRequest;
 
-/// A key that means something.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::cmd) enum Key {
-    Enter,
-    Letter(char),
-}
-
-/// Whether a screen has the terminal: whatever ends the program gives it back first.
-static IS_TAKEN: AtomicBool = AtomicBool::new(false);
-/// How long the reader of keys takes at most to notice that it is to end.
-const READER: Duration = Duration::from_millis(50);
+/// Whether a screen has the terminal. Held while a frame is written, so that nothing is written into the middle of one, and nothing after
+/// the terminal was given back.
+static IS_TAKEN: Mutex<bool> = Mutex::new(false);
+/// A terminal that takes no bytes must not keep the program from ending.
+const PATIENCE: Duration = Duration::from_millis(200);
 
 /// A terminal in raw mode that shows the alternate screen.
 pub(super) struct Terminal {
-    terminal: ratatui::Terminal<CrosstermBackend<Stderr>>,
-    keys: Receiver<Key>,
+    terminal: ratatui::Terminal<CrosstermBackend<Frames>>,
+    pressed: Receiver<Key>,
+    /// Taken from `pressed`, and not yet heard.
+    keys: VecDeque<Key>,
     is_over: Arc<AtomicBool>,
     reader: Option<JoinHandle<()>>,
 }
@@ -42,30 +39,36 @@ impl Terminal {
     /// Takes the terminal; Ctrl-C, which reaches the program as a key from here on, still asks it to end.
     pub(super) fn take(end: EndRequest) -> std::io::Result<Self> {
         give_back_on_panic();
-        IS_TAKEN.store(true, Ordering::SeqCst);
+        *lock() = true;
         let terminal = enable_raw_mode()
             .and_then(|()| execute!(stderr(), EnterAlternateScreen))
-            .and_then(|()| ratatui::Terminal::new(CrosstermBackend::new(stderr())))
+            .and_then(|()| ratatui::Terminal::new(CrosstermBackend::new(Frames::default())))
             .inspect_err(|_| give_back())?;
-        let (sender, keys) = channel();
+        let (sender, pressed) = channel();
         let is_over = Arc::new(AtomicBool::new(false));
         let reader = std::thread::Builder::new().name("keys".into()).spawn({
             let is_over = Arc::clone(&is_over);
-            move || read_keys(&sender, &end, &is_over)
+            move || pass_keys(&sender, &end, &is_over)
         });
         let reader = Some(reader.inspect_err(|_| give_back())?);
-        Ok(Self { terminal, keys, is_over, reader })
+        Ok(Self { terminal, pressed, keys: VecDeque::new(), is_over, reader })
     }
 
     /// Draws; the window may have changed its size.
     pub(super) fn draw(&mut self, picture: &Picture, notes: &[String]) {
-        // A terminal that is gone shows nothing; the run goes on, or is ended by the signal that comes with it.
+        // A terminal that is gone shows nothing; the run is ended by the signal that comes with it.
         let _ = self.terminal.draw(|frame| layout::draw(frame, picture, notes));
     }
 
     /// The next key that was pressed.
-    pub(super) fn key(&self) -> Option<Key> {
-        self.keys.try_recv().ok()
+    pub(super) fn key(&mut self) -> Option<Key> {
+        self.keys.pop_front().or_else(|| self.pressed.try_recv().ok())
+    }
+
+    /// Forgets every press of a key so far.
+    pub(super) fn forget(&mut self, key: Key) {
+        self.keys.extend(self.pressed.try_iter());
+        self.keys.retain(|other| *other != key);
     }
 }
 
@@ -81,11 +84,24 @@ impl Drop for Terminal {
 
 /// Gives the terminal back as it was, if a screen has it.
 pub(in crate::cmd) fn give_back() {
-    if IS_TAKEN.swap(false, Ordering::SeqCst) {
+    let began = Instant::now();
+    let mut is_taken = loop {
+        match IS_TAKEN.try_lock() {
+            Ok(is_taken) => break Some(is_taken),
+            Err(TryLockError::Poisoned(poisoned)) => break Some(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) if began.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(1)),
+            Err(TryLockError::WouldBlock) => break None,
+        }
+    };
+    if is_taken.as_mut().is_none_or(|is_taken| std::mem::take(&mut **is_taken)) {
         // Whatever fails here cannot be told anywhere.
-        let _ = execute!(stderr(), LeaveAlternateScreen, Show);
         let _ = disable_raw_mode();
+        let _ = execute!(stderr(), LeaveAlternateScreen, Show);
     }
+}
+
+fn lock() -> MutexGuard<'static, bool> {
+    IS_TAKEN.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 fn give_back_on_panic() {
@@ -99,38 +115,38 @@ fn give_back_on_panic() {
     });
 }
 
-/// Passes keys on until the screen is over or the terminal gone, which asks the program to end as well.
-fn read_keys(keys: &Sender<Key>, end: &EndRequest, is_over: &AtomicBool) {
+/// Passes keys on until the screen is over, or the terminal gone, which asks the program to end as well.
+fn pass_keys(pressed: &Sender<Key>, end: &EndRequest, is_over: &AtomicBool) {
+    let mut keyboard = Keyboard::default();
     while !is_over.load(Ordering::Relaxed) {
-        let event = match event::poll(READER) {
-            Ok(false) => continue,
-            Ok(true) => event::read(),
-            Err(error) => Err(error),
-        };
-        match event {
-            Ok(Event::Key(key)) if key.kind == KeyEventKind::Press => match meaning(key) {
-                Some(Pressed::End) => end.insist(),
-                Some(Pressed::Key(key)) if keys.send(key).is_err() => return,
+        let Ok(keys) = keyboard.wait() else { return end.make() };
+        for key in keys {
+            match key {
+                Key::End => end.insist(),
+                key if pressed.send(key).is_err() => return,
                 _ => {}
-            },
-            Ok(_) => {}
-            Err(_) => return end.make(),
+            }
         }
     }
 }
 
-enum Pressed {
-    End,
-    Key(Key),
-}
+/// Writes whole frames to stderr while the screen has the terminal. A terminal that is gone is no error: what it would show is said again
+/// at the end.
+#[derive(Default)]
+struct Frames(Vec<u8>);
 
-fn meaning(key: KeyEvent) -> Option<Pressed> {
-    match key.code {
-        KeyCode::Char('c' | '\\') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(Pressed::End),
-        KeyCode::Enter => Some(Pressed::Key(Key::Enter)),
-        KeyCode::Char(letter) if !key.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT) => {
-            Some(Pressed::Key(Key::Letter(letter.to_ascii_lowercase())))
+impl Write for Frames {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        let is_taken = lock();
+        if *is_taken {
+            let _ = stderr().write_all(&self.0);
         }
-        _ => None,
+        self.0.clear();
+        Ok(())
     }
 }

@@ -8,8 +8,8 @@ use super::record_error;
 use super::watch::RobotAndFrame;
 use crate::board::{Frame, RobotOnBoard, StreamTally};
 use crate::cmd::outcome::CommandError;
-use crate::session::{MeasuredPose, Recorder};
-use crate::units::mm_from_m;
+use crate::session::{Connection, MeasuredPose, Recorder};
+use crate::units::{mm_from_m, tidy};
 
 /// The books of one run.
 pub(super) struct Account {
@@ -17,7 +17,7 @@ pub(super) struct Account {
     /// What computes lengths, where that can be.
     model: Option<Model>,
     pub(super) recorder: Option<Recorder>,
-    pub(super) bar_mm: Option<f64>,
+    pub(super) connection: Option<Connection>,
     pub(super) tally: StreamTally,
     pub(super) latest: Latest,
     pub(super) samples: u64,
@@ -43,14 +43,14 @@ impl Account {
         robot: Option<RobotOnBoard>,
         model: Option<Model>,
         recorder: Option<Recorder>,
-        bar_mm: Option<f64>,
+        connection: Option<Connection>,
         criteria: StillnessCriteria,
     ) -> Self {
         Self {
             robot,
             model,
             recorder,
-            bar_mm,
+            connection,
             withheld: 0,
             doubtful: None,
             last_written: None,
@@ -83,7 +83,7 @@ impl Account {
                     self.clock = Some([self.clock.map_or(now, |[first, _]| first), now]);
                     self.detector.push(&sample);
                     if sample.index == batch.first.index.wrapping_add(batch.rest.len() as u32) {
-                        self.latest.take_sample(&sample, self.robot.as_ref(), self.bar_mm);
+                        self.latest.take_sample(&sample, self.robot.as_ref(), self.bar_mm());
                     }
                 }
                 self.latest.take_stillness(self.detector.stillness());
@@ -101,7 +101,8 @@ impl Account {
     }
 
     pub(super) fn take_status(&mut self, status: &Status) {
-        self.latest.take_status(status, self.robot.as_ref(), self.bar_mm);
+        self.is_homed = self.robot.as_ref().map(|robot| robot.is_homed_by(status));
+        self.latest.take_status(status, self.robot.as_ref(), self.bar_mm());
     }
 
     /// The port was lost, or the board reset.
@@ -120,6 +121,10 @@ impl Account {
         recorder.back().map_err(record_error)?;
         recorder.frame(hello_frame).map_err(record_error)?;
         robot.map_or(Ok(()), |(_, frame)| recorder.frame(frame)).map_err(record_error)
+    }
+
+    fn bar_mm(&self) -> Option<f64> {
+        self.connection.as_ref().map(|connection| tidy(mm_from_m(connection.bar_m)))
     }
 
     /// Messages and samples lost.
@@ -160,7 +165,7 @@ impl Account {
             return Ok(format!("settled {number}: {joints}, and the bar beyond its travel: no pose"));
         };
         let displacement_mm = mm_from_m(displacement_m);
-        let length = match self.bar_mm {
+        let length = match self.bar_mm() {
             Some(bar_mm) => format!("{:.4} mm", bar_mm + displacement_mm),
             None => format!("{displacement_mm:+.4} mm from mid travel"),
         };

@@ -2,15 +2,19 @@
 
 use std::time::Duration;
 
+use ballbar::Stillness;
+
 use super::StreamArgs;
 use super::account::Account;
+use super::live::Latest;
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::cmd::screen::{Bar, Joint, Picture, Poses};
 use crate::units::mm_from_m;
 
 /// The picture of a moment; without a link, of a board that is away.
 pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Account, elapsed: Duration) -> Picture {
-    let (latest, robot) = (&account.latest, account.robot.as_ref());
+    let (away, robot) = (Latest::default(), account.robot.as_ref());
+    let latest = if link.is_some() { &account.latest } else { &away };
     let mut head = vec!["stream".to_owned(), args.port.port.clone()];
     head.extend(link.map(|link| format!("{} {}", link.hello().board, link.hello().firmware)));
     head.extend(robot.map(|robot| robot.set().name.as_str().to_owned()));
@@ -22,13 +26,12 @@ pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Acc
         let (least_m, most_m) = robot.set().lvdt.travel_m::<f64>();
         [mm_from_m(least_m), mm_from_m(most_m)]
     });
-    let name = args.pairing.as_ref().zip(args.bar).map(|(pairing, bar_mm)| format!("{pairing}, {bar_mm} mm"));
     Picture {
         head,
         elapsed,
         joints,
         bar: Bar {
-            name,
+            name: account.connection.as_ref().map(ToString::to_string),
             length_mm: latest.length_mm,
             displacement_mm: latest.displacement_mm,
             travel_mm,
@@ -38,8 +41,8 @@ pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Acc
         rate_hz: account.rate_hz(),
         lost: account.lost(),
         stillness: latest.stillness,
-        is_homed: account.is_homed,
-        residual_mm: account.residual_mm(),
+        is_homed: account.is_homed.filter(|_| link.is_some()),
+        residual_mm: account.residual_mm().filter(|_| link.is_some()),
         poses: Poses { done: account.settled, of: args.poses, left: args.time.map(|time| time.saturating_sub(elapsed)) },
         next: next(args, link.is_some(), account, robot),
         is_waiting: link.is_none(),
@@ -61,12 +64,15 @@ fn next(args: &StreamArgs, is_there: bool, account: &Account, robot: Option<&Rob
     if !args.selection().settled {
         return "watch".into();
     }
+    if account.latest.counts.is_empty() {
+        return "the board is asked".into();
+    }
     if account.latest.displacement_mm.is_none() {
         return "attach the bar, or move the arm until the bar is within its travel".into();
     }
     match account.latest.stillness {
-        Some(ballbar::Stillness::Settled) => "the pose is taken: move the arm to the next one".into(),
-        Some(ballbar::Stillness::Settling) => "hold still".into(),
+        Some(Stillness::Settled) => "the arm stands still: move it to the next pose".into(),
+        Some(Stillness::Settling) => "hold still".into(),
         _ => "move the arm to a pose, and let it stand still".into(),
     }
 }

@@ -22,6 +22,9 @@ pub(super) struct Watch<'a> {
     account: Account,
     end: EndRequest,
     screen: Screen,
+    /// Without samples only the board's status tells what the screen shows.
+    is_blind: bool,
+    asked: Instant,
     began: Instant,
     /// When the board last said anything.
     heard: Instant,
@@ -49,6 +52,8 @@ pub(super) type RobotAndFrame = (RobotOnBoard, Vec<u8>);
 
 /// After this much silence the board is asked how it is.
 const SILENCE: Duration = Duration::from_secs(1);
+/// How often it is asked where nothing else tells how the arm stands.
+const ASK: Duration = Duration::from_millis(250);
 /// How often a lost port is tried again.
 const RETRY: Duration = Duration::from_millis(300);
 
@@ -57,7 +62,8 @@ impl<'a> Watch<'a> {
         let now = Instant::now();
         let end = EndRequest::listen();
         let screen = Screen::open(&end);
-        Self { args, link: Link::Up(Box::new(link)), account, end, screen, began: now, heard: now }
+        let is_blind = screen.is_steady() && !args.selection().samples;
+        Self { args, link: Link::Up(Box::new(link)), account, end, screen, is_blind, asked: now, began: now, heard: now }
     }
 
     /// Until the time is over, the poses are there, or the user has had enough.
@@ -71,6 +77,13 @@ impl<'a> Watch<'a> {
                 self.wait_for_port()?;
                 continue;
             };
+            if self.is_blind && self.asked.elapsed() >= ASK {
+                self.asked = Instant::now();
+                if let Some(reason) = ask(link, &mut self.account)? {
+                    self.lose(&reason)?;
+                }
+                continue;
+            }
             let lost = match link.next_frame() {
                 Ok(Some(frame)) => {
                     self.heard = Instant::now();
@@ -144,8 +157,10 @@ impl<'a> Watch<'a> {
 
     /// Shows how things stand, and hears the keys.
     fn show(&mut self) {
-        if self.screen.key() == Some(Key::Letter('q')) {
-            self.end.make();
+        while let Some(key) = self.screen.key() {
+            if key == Key::Letter('q') {
+                self.end.make();
+            }
         }
         let (account, args, began) = (&self.account, self.args, self.began);
         match &self.link {
