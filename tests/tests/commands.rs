@@ -48,7 +48,7 @@ fn help_says_what_each_command_is_for_and_how_to_begin() {
     shows(&folder, "help", &["--help"]);
     let with_a_board = ["ports", "stream", "log", "status", "home", "lvdt", "apply", "pose", "virtual-board"];
     for command in
-        ["fit", "validate", "rank", "report", "fk", "plan", "simulate", "paper", "demo"].into_iter().chain(with_a_board)
+        ["fit", "validate", "rank", "report", "fk", "export", "import", "compensate", "plan", "simulate", "paper", "demo"].into_iter().chain(with_a_board)
     {
         let long = shows(&folder, &format!("help_{command}"), &[command, "--help"]);
         assert_eq!(long.stdout, runs(&folder, &[&["help", command]]).stdout);

@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use miette::Diagnostic;
 use serde::Serialize;
+use thiserror::Error;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
-use crate::export::{Format, export};
+use crate::export::{Format, JointZero, export};
 use crate::files::Robot;
 use crate::units::mm_from_m;
 
@@ -22,6 +24,9 @@ pub(super) struct ExportArgs {
     /// What to write it as
     #[arg(long, value_enum)]
     format: Format,
+    /// Of a URDF: where joint values are zero [default: model]
+    #[arg(long, value_enum, value_name = "WHERE")]
+    joint_zero: Option<JointZero>,
     /// File to write; printed when not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -29,9 +34,15 @@ pub(super) struct ExportArgs {
     output: OutputArgs,
 }
 
+#[derive(Debug, Error, Diagnostic)]
+#[error("--joint-zero is only for formats with a URDF")]
+#[diagnostic(help("The other formats hold offset and scale: leave it out, or take --format urdf or --format ros2."))]
+struct NoUrdf;
+
 #[derive(Serialize)]
 struct ExportReport {
     robot: String,
+    format: String,
     calibrated: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<PathBuf>,
@@ -48,8 +59,11 @@ struct ExportReport {
 
 impl ExportArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        if self.joint_zero.is_some() && !matches!(self.format, Format::Urdf | Format::Ros2) {
+            return Err(NoUrdf.into());
+        }
         let robot = Robot::open(&self.robot)?;
-        let exported = export(&robot, self.format);
+        let exported = export(&robot, self.format, self.joint_zero.unwrap_or_default());
         for remark in &exported.remarks {
             warn(remark);
         }
@@ -58,6 +72,7 @@ impl ExportArgs {
         }
         let report = ExportReport {
             robot: robot.name.clone(),
+            format: self.format.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned()),
             calibrated: robot.calibration.is_some(),
             out: self.out.clone(),
             text: self.out.is_none().then_some(exported.text),

@@ -181,8 +181,8 @@ pub enum Problem {
     #[error("a quote that is opened on this line is not closed on it")]
     OpenQuote,
     /// A header and nothing else.
-    #[error("no poses")]
-    NoPoses,
+    #[error("no {0}")]
+    NoRows(&'static str),
     /// CSV that cannot be split into records.
     #[error("not CSV: {0}")]
     Csv(String),
@@ -277,7 +277,8 @@ impl Problem {
             | Self::UnknownColumn { expected, .. }
             | Self::JointColumns { header: expected, .. } => return Some(format!("Expected: {expected}.")),
             Self::UnknownEnd { .. } => "Names are compared letter by letter; is this the rig that was measured with?",
-            Self::NoPoses => "Was the recording stopped before the first pose settled?",
+            Self::NoRows("targets") => "Write a target a line below the header.",
+            Self::NoRows(_) => "Was the recording stopped before the first pose settled?",
             Self::Word { .. } => return None,
             Self::TooLong { .. } => "Robot descriptions are far shorter; is it the right file?",
             Self::Xml(_) => {

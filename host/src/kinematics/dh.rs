@@ -100,8 +100,7 @@ impl DhTable {
                 nearly_parallel: Vec::new(),
             };
         };
-        let across = any_perpendicular(&first.direction);
-        let begin = Normal { direction: across, from_m: first.point_m, to_m: first.point_m, a_m: 0.0, alpha_rad: 0.0 };
+        let begin = begin(first);
         let normals: Vec<Normal> = axes.windows(2).scan(begin, |last, pair| Some(next(last, &pair[0], &pair[1]))).collect();
         let table = Self {
             convention,
@@ -110,42 +109,26 @@ impl DhTable {
             last_from_tool: posture.base_from_tool,
             nearly_parallel: nearly_parallel(axes),
         };
-        match convention {
-            Convention::Standard => table.with_standard_rows(axes, begin, &normals),
-            Convention::Modified => table.with_modified_rows(axes, begin, &normals),
-        }
+        table.with_rows(axes, begin, &normals).closed()
     }
 
-    fn with_standard_rows(mut self, axes: &[Axis], begin: Normal, normals: &[Normal]) -> Self {
+    fn with_rows(mut self, axes: &[Axis], begin: Normal, normals: &[Normal]) -> Self {
         let mut last = begin;
-        let tool_m = self.last_from_tool.translation_m;
         for (i, axis) in axes.iter().enumerate() {
             // Behind the last axis there is no other: its row goes on along it as far as the tool does.
-            let tool_along_m = last.to_m + axis.direction * axis.direction.dot(&(tool_m - last.to_m));
-            let end = Normal { from_m: tool_along_m, to_m: tool_along_m, a_m: 0.0, alpha_rad: 0.0, ..last };
-            let normal = normals.get(i).copied().unwrap_or(end);
-            self.rows.push(row(axis, &last, &normal, (normal.a_m, normal.alpha_rad)));
+            let normal = normals.get(i).copied().unwrap_or_else(|| end(axis, &last, &self.last_from_tool));
+            let between = match self.convention {
+                Convention::Standard => normal,
+                Convention::Modified => last,
+            };
+            self.rows.push(row(axis, &last, &normal, (between.a_m, between.alpha_rad)));
             last = normal;
         }
-        self.close()
-    }
-
-    fn with_modified_rows(mut self, axes: &[Axis], begin: Normal, normals: &[Normal]) -> Self {
-        let mut last = normals.first().copied().map_or(begin, |first| Normal { to_m: first.from_m, ..first });
-        last = Normal { a_m: 0.0, alpha_rad: 0.0, ..last };
-        if let Some(first) = axes.first() {
-            self.base_from_first = last.frame(&first.direction);
-        }
-        for (i, axis) in axes.iter().enumerate() {
-            let normal = normals.get(i).copied().unwrap_or(Normal { from_m: last.to_m, ..last });
-            self.rows.push(row(axis, &last, &normal, (last.a_m, last.alpha_rad)));
-            last = normal;
-        }
-        self.close()
+        self
     }
 
     /// Whatever the rows leave of the tool's pose at encoders zero is the last transform.
-    fn close(mut self) -> Self {
+    fn closed(mut self) -> Self {
         let base_from_tool = self.last_from_tool;
         self.last_from_tool = from_link(Vector3::zeros(), [0.0; 3]);
         self.last_from_tool = compose(&inverse(&self.base_from_tool(&[])), &base_from_tool);
@@ -200,6 +183,30 @@ impl Normal {
     }
 }
 
+/// Where the table begins on the first axis: below or above the base frame's origin, x as near to the base's as can be. So the transform
+/// before the first row is none where the first axis is the base's z.
+fn begin(first: &Axis) -> Normal {
+    let foot_m = first.point_m - first.direction * first.direction.dot(&first.point_m);
+    let x = across(&first.direction, &Vector3::x(), &Vector3::y());
+    Normal { direction: x, from_m: foot_m, to_m: foot_m, a_m: 0.0, alpha_rad: 0.0 }
+}
+
+/// Where the table ends on the last axis: beside the tool, x as near to the tool's as can be.
+fn end(axis: &Axis, last: &Normal, base_from_tool: &Pose<f64>) -> Normal {
+    let foot_m = last.to_m + axis.direction * axis.direction.dot(&(base_from_tool.translation_m - last.to_m));
+    let column = |i: usize| base_from_tool.rotation.column(i).into();
+    let x = across(&axis.direction, &column(0), &column(1));
+    Normal { direction: x, from_m: foot_m, to_m: foot_m, a_m: 0.0, alpha_rad: 0.0 }
+}
+
+/// What of a direction is across an axis; of another one where it is along it.
+fn across(axis: &Vector3<f64>, direction: &Vector3<f64>, other: &Vector3<f64>) -> Vector3<f64> {
+    /// Sine of what is along.
+    const ALONG: f64 = 0.1;
+    let part = |v: &Vector3<f64>| v - axis * axis.dot(v);
+    part(direction).try_normalize(ALONG).unwrap_or_else(|| part(other).normalize())
+}
+
 /// What lies along and about an axis between the normal that ends on it and the one that begins there.
 fn row(axis: &Axis, last: &Normal, normal: &Normal, (a_m, alpha_rad): (f64, f64)) -> DhRow {
     let z = axis.direction;
@@ -238,9 +245,4 @@ fn nearly_parallel(axes: &[Axis]) -> Vec<NearlyParallel> {
         NearlyParallel { joint: i + 1, angle_rad: z.cross(&w).norm().atan2(z.dot(&w).abs()) }
     });
     angles.filter(|pair| (PARALLEL_RAD..NEARLY_PARALLEL_RAD).contains(&pair.angle_rad)).collect()
-}
-
-fn any_perpendicular(z: &Vector3<f64>) -> Vector3<f64> {
-    let helper = if z.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
-    (helper - z * z.dot(&helper)).normalize()
 }
