@@ -50,7 +50,8 @@ pub fn write_calibrated(folder: &Path, design: &str) -> Robot {
 /// Joint vectors over the limits, radians and metres; no two joints go alike.
 pub fn joint_vectors(robot: &Robot, count: usize) -> Vec<Vec<f64>> {
     let share = |step: usize, joint: usize| (0.137 + step as f64 / count as f64 + 0.618 * joint as f64).fract();
-    let joints = |step| robot.limits.iter().enumerate().map(move |(i, limits)| limits.min + (limits.max - limits.min) * share(step, i));
+    let joints =
+        |step| robot.limits.iter().enumerate().map(move |(i, limits)| limits.min + (limits.max - limits.min) * share(step, i));
     (0..count).map(|step| joints(step).collect()).collect()
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 
 use ballbar_tests::command::{Run, host_cal_in};
 use ballbar_tests::exports::{joint_vectors, pose_by_products, write_calibrated};
-use host_cal::files::{Robot, Source, Target, read_targets};
+use host_cal::files::{Goal, ROBOTS, Robot, Source, Target, read_targets};
 use host_cal::kinematics::{Compensation, Compensator, Unreached};
 use nalgebra::{Matrix4, Vector3};
 use tempfile::TempDir;
@@ -91,7 +91,7 @@ fn a_controller_that_takes_poses_gets_one_that_its_own_inverse_turns_into_the_co
     let found = commands(&real, &nominal, &format!("{JOINTS}{q}\n"))[0].unwrap();
     // The controller: its model's inverse, near where it would have been.
     let controller = Compensator::new(&nominal, &nominal);
-    let goal = host_cal::files::Goal::Pose(found.nominal_base_from_tool, Some(found.nominal_q));
+    let goal = Goal::Pose(found.nominal_base_from_tool, Some(found.nominal_q));
     let theirs = controller.compensate(&goal, &found.nominal_q, |q| q).unwrap();
     let off = theirs.q.as_array().iter().zip(found.q.as_array()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(off < 1e-8, "{off:e}");
@@ -102,7 +102,13 @@ fn an_arm_of_few_joints_gets_to_the_position_and_says_how_far_it_is_turned() {
     let (real, nominal) = robots("scara");
     let kinds = "q1_deg,q2_deg,q3_mm,q4_deg\n";
     for q in joint_vectors(&nominal, 3) {
-        let row = format!("{:?},{:?},{:?},{:?}\n", q[0].to_degrees(), 40.0 + q[1].to_degrees().abs() / 3.0, q[2] * 1e3, q[3].to_degrees());
+        let row = format!(
+            "{:?},{:?},{:?},{:?}\n",
+            q[0].to_degrees(),
+            40.0 + q[1].to_degrees().abs() / 3.0,
+            q[2] * 1e3,
+            q[3].to_degrees()
+        );
         match commands(&real, &nominal, &format!("{kinds}{row}"))[0] {
             Ok(found) => {
                 let wanted = pose_by_products(&nominal, found.nominal_q.as_array());
@@ -117,6 +123,17 @@ fn an_arm_of_few_joints_gets_to_the_position_and_says_how_far_it_is_turned() {
     }
     let pose = commands(&real, &nominal, &format!("{POSE}400,200,100,30,0,180\n400,200,100,30,5,180\n"));
     assert_eq!(pose[1], Err(Unreached::ByNominal), "no SCARA tilts its tool");
+}
+
+#[test]
+fn an_arm_shorter_than_its_design_does_not_reach_as_far() {
+    let (_, text) = ROBOTS.iter().find(|(name, _)| *name == "ur5e").expect("a built-in robot");
+    let nominal = Robot::open("ur5e").expect("a built-in robot");
+    let shorter = Robot::parse(&Source::new("shorter", &text.replace("-425.0", "-424.0"))).expect("a robot");
+    let stretched = format!("{JOINTS}0,-90,0,-90,0,0\n0,-90,30,-90,60,0\n");
+    let found = commands(&shorter, &nominal, &stretched);
+    assert_eq!(found[0], Err(Unreached::ByCalibrated));
+    assert!(found[1].is_ok(), "{found:?}");
 }
 
 fn run(folder: &TempDir, text: &str, more: &[&str]) -> Run {

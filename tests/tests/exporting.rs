@@ -101,12 +101,15 @@ fn the_built_in_robots_survive_a_urdf_and_both_tables() {
 fn the_table_of_the_ur5e_is_the_one_that_its_maker_publishes() {
     let robot = Robot::open("ur5e").unwrap();
     let table = DhTable::new(&robot.chain, Convention::Standard);
-    // Universal Robots: a, d in metres; the signs of a and the turns of theta that go with them are a matter of choice.
-    let (a, d) = ([0.0, 0.425, 0.3922, 0.0, 0.0, 0.0], [0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996]);
+    // Universal Robots, "DH Parameters for calculations of kinematics and dynamics": metres, theta zero.
+    let (a, d) = ([0.0, -0.425, -0.3922, 0.0, 0.0, 0.0], [0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996]);
+    let alpha = [PI / 2.0, 0.0, 0.0, PI / 2.0, -PI / 2.0, 0.0];
     for (i, row) in table.rows.iter().enumerate() {
-        assert!((row.a_m.abs() - a[i]).abs() < 1e-12, "a{} = {}", i + 1, row.a_m);
-        assert!((row.d_m.abs() - d[i]).abs() < 1e-12, "d{} = {}", i + 1, row.d_m);
+        let off = [row.a_m - a[i], row.d_m - d[i], row.alpha_rad - alpha[i], row.theta_rad];
+        assert!(off.iter().all(|off| off.abs() < 1e-12), "row {}: {row:?}", i + 1);
     }
+    let nothing = |pose: &ballbar::Pose<f64>| pose.translation_m.amax() + (pose.rotation - ballbar::Matrix3::identity()).amax();
+    assert!(nothing(&table.base_from_first) < 1e-12 && nothing(&table.last_from_tool) < 1e-12, "{table:?}");
     assert!(table.nearly_parallel.is_empty(), "exactly parallel axes are no trouble");
 }
 
@@ -193,7 +196,14 @@ fn hostile_files_are_refused_clearly() {
     let two_parents = robot(&["a", "b", "c"], &[joint("1", "a", "c"), joint("2", "b", "c")]);
     assert!(refusal(&two_parents).contains("child of two joints"));
     assert!(refusal(&robot(&["a", "b"], &[])).contains("2 links have no joint above them: a, b"));
-    assert!(refusal(&robot(&["a", "b", "c"], &[joint("1", "a", "b"), joint("2", "a", "c")])).contains("several ends"));
+    let fork = robot(&["a", "b", "c"], &[joint("1", "a", "b"), joint("2", "a", "c")]);
+    assert!(refusal(&fork).contains("several ends"));
+    for (base, tip, says) in
+        [("b", "c", "no joints lead from the base"), ("a", "d", "--tip `d` is no link"), ("d", "b", "--base `d`")]
+    {
+        let refusal = imported(&fork, UrdfEnds { base: Some(base), tip: Some(tip) }).unwrap_err();
+        assert!(refusal.contains(says), "{refusal}");
+    }
     assert!(refusal(&robot(&["a"], &[])).contains("0 joints, expected 1 to 8"));
     let names: Vec<String> = (0..10).map(|i| format!("l{i}")).collect();
     let nine: Vec<String> = (0..9).map(|i| joint(&format!("j{i}"), &names[i], &names[i + 1])).collect();
@@ -207,7 +217,9 @@ fn hostile_files_are_refused_clearly() {
         ("xyz=\"0 0 1\"", "xyz=\"0 1e99 1\"", "`0 1e99 1`"),
         ("\"continuous\"", "\"planar\"", "type of joint `j` is `planar`"),
         ("\"continuous\"", "\"revolute\"", "<limit> of joint `j` is missing"),
-        ("<axis", "<mimic joint=\"k\"/><axis", "<mimic> of joint `j`"),
+        ("<axis", "<mimic joint=\"k\"/><axis", "joint `j` is moved along by another"),
+        ("\"0 0 1\"", "\"0 0 ${pi}\"", "this is xacro"),
+        ("<link", "<x:macro xmlns:x=\"http://www.ros.org/wiki/xacro\"/><link", "this is xacro"),
         ("<robot", "<sdf", "not XML"),
     ] {
         let refusal = refusal(&two.replacen(found, broken, 1));

@@ -12,6 +12,7 @@ use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use crate::export::{Format, JointZero, export};
 use crate::files::Robot;
+use crate::kinematics::NearlyParallel;
 use crate::units::mm_from_m;
 
 /// Write a robot as URDF, DH table, data or source code
@@ -54,7 +55,17 @@ struct ExportReport {
     largest_difference_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     largest_difference_deg: Option<f64>,
+    /// Of DH tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nearly_parallel: Option<Vec<NearlyParallelReport>>,
     warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct NearlyParallelReport {
+    /// Numbers of the two joints, from 1.
+    joints: [usize; 2],
+    angle_deg: f64,
 }
 
 impl ExportArgs {
@@ -78,11 +89,16 @@ impl ExportArgs {
             text: self.out.is_none().then_some(exported.text),
             largest_difference_mm: exported.largest_difference.map(|(off_m, _)| mm_from_m(off_m)),
             largest_difference_deg: exported.largest_difference.map(|(_, turned_rad)| turned_rad.to_degrees()),
+            nearly_parallel: exported.largest_difference.map(|_| exported.nearly_parallel.iter().map(pair).collect()),
             warnings: exported.remarks,
         };
         print(&report, self.output.json)?;
         Ok(Outcome::Good)
     }
+}
+
+fn pair(pair: &NearlyParallel) -> NearlyParallelReport {
+    NearlyParallelReport { joints: [pair.joint, pair.joint + 1], angle_deg: pair.angle_rad.to_degrees() }
 }
 
 impl Report for ExportReport {

@@ -52,7 +52,11 @@ const PRECISE: &str = "#[allow(clippy::approx_constant, clippy::excessive_precis
 pub(super) fn rust_constants(robot: &Robot) -> String {
     let mut text = format!("// {}\n// Metres and radians.\n{}\n", origin(robot), model_lines("// "));
     let count = robot.chain.joints();
-    let _ = writeln!(text, "/// x, y, z, alpha, beta, gamma of each link.\n{PRECISE}\npub const LINKS: [[f64; 6]; {}] = [", count + 1);
+    let _ = writeln!(
+        text,
+        "/// x, y, z, alpha, beta, gamma of each link.\n{PRECISE}\npub const LINKS: [[f64; 6]; {}] = [",
+        count + 1
+    );
     for link in links(robot) {
         let _ = writeln!(text, "    [{}],", commas(&link));
     }

@@ -24,7 +24,8 @@ pub(super) fn exported(robot: &Robot, convention: Convention) -> Exported {
         )
     });
     let remarks: Vec<String> = remarks.collect();
-    Exported { text: text(robot, &table, difference, &remarks), remarks, largest_difference: Some(difference) }
+    let text = text(robot, &table, difference, &remarks);
+    Exported { text, remarks, largest_difference: Some(difference), nearly_parallel: table.nearly_parallel }
 }
 
 /// What a reader of the text gets: the difference to the robot is that of the file.

@@ -6,7 +6,7 @@ mod dh;
 mod urdf;
 
 use crate::files::Robot;
-use crate::kinematics::Convention;
+use crate::kinematics::{Convention, NearlyParallel};
 
 /// What to write a robot as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -56,11 +56,13 @@ pub struct Exported {
     pub remarks: Vec<String>,
     /// Of a format with another model: the largest differences to the robot over random joint vectors, metres and radians.
     pub largest_difference: Option<(f64, f64)>,
+    /// Of a DH table: axes whose common normal is far away.
+    pub nearly_parallel: Vec<NearlyParallel>,
 }
 
 /// Writes a robot in a format; `zero` is for those that hold a URDF.
 pub fn export(robot: &Robot, format: Format, zero: JointZero) -> Exported {
-    let exact = |text| Exported { text, remarks: Vec::new(), largest_difference: None };
+    let exact = |text| Exported { text, remarks: Vec::new(), largest_difference: None, nearly_parallel: Vec::new() };
     match format {
         Format::Urdf => Exported { remarks: urdf::remarks(robot, zero), ..exact(urdf::text(robot, zero)) },
         Format::Ros2 => Exported { remarks: urdf::remarks(robot, zero), ..exact(urdf::ros2_parameters(robot, zero)) },

@@ -72,16 +72,19 @@ pub(super) fn remarks(robot: &Robot, zero: JointZero) -> Vec<String> {
         vec!["effort and velocity limits are not known here and stand as 0: set them before a planner reads them".to_owned()];
     if !moved.is_empty() {
         let (holds_no, value) = match zero {
-            JointZero::Model => ("offset and scale", "offset + scale * encoder output"),
-            JointZero::Encoder => ("scale", "scale * encoder output"),
+            JointZero::Model => ("offset and scale: they are", "offset + scale * encoder output"),
+            JointZero::Encoder => ("scale: it is", "scale * encoder output"),
         };
         remarks.push(format!(
-            "URDF holds no joint {holds_no}: they are in <{ENCODER_ELEMENT}> of {}; publish {value} as these joints' values",
+            "URDF holds no joint {holds_no} in <{ENCODER_ELEMENT}> of {}; publish {value} as these joints' values",
             moved.join(", ")
         ));
     }
-    if zero == JointZero::Model && (0..robot.chain.joints()).filter_map(|i| robot.chain.joint(i)).any(|joint| joint.offset != 0.0) {
-        remarks.push("with --joint-zero encoder the offsets are in the origins, and joint values begin at the encoders' zero".to_owned());
+    if zero == JointZero::Model && (0..robot.chain.joints()).filter_map(|i| robot.chain.joint(i)).any(|joint| joint.offset != 0.0)
+    {
+        remarks.push(
+            "with --joint-zero encoder the offsets are in the origins, and joint values begin at the encoders' zero".to_owned(),
+        );
     }
     if robot.encoders.iter().any(|facts| facts.encoder.is_some() || !facts.couplings.is_empty()) {
         remarks.push("encoder counts and couplings are not in it; keep the robot file".to_owned());

@@ -106,13 +106,7 @@ fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<V
     rows.records().iter().map(|record| read_row(&rows, rig, &columns, record, file)).collect()
 }
 
-fn read_row(
-    rows: &CsvRows<'_>,
-    rig: &Rig,
-    columns: &Columns,
-    record: &StringRecord,
-    file: usize,
-) -> Result<PoseRow, InputError> {
+fn read_row(rows: &CsvRows<'_>, rig: &Rig, columns: &Columns, record: &StringRecord, file: usize) -> Result<PoseRow, InputError> {
     let pairing = rows.pairing(record, rig, columns.chuck, columns.sphere)?;
     let q = rows.joint_vector(record, &columns.q)?;
     let length_m = m_from_mm(rows.number(record, columns.length, Of::Positive)?);

@@ -105,9 +105,7 @@ impl Compensator {
     ) -> Result<Compensation, Unreached> {
         let (wanted, nominal_q) = match *goal {
             Goal::Joints(q) => (self.nominal_forward.base_from_tool(&q), q),
-            Goal::Pose(pose, near) => {
-                (pose, self.nominal_joints(&pose, &near.unwrap_or(*before)).ok_or(Unreached::ByNominal)?)
-            }
+            Goal::Pose(pose, near) => (pose, self.nominal_joints(&pose, &near.unwrap_or(*before)).ok_or(Unreached::ByNominal)?),
         };
         let stepped = self.calibrated.reach(&nominal_q, &wanted);
         let near = stepped.filter(|q| is_near(q, &nominal_q));

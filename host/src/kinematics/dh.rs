@@ -1,7 +1,8 @@
 //! Denavit-Hartenberg tables of a chain, standard and modified.
 //!
 //! Both describe the same common normals, one between each axis and the next: a_i its length, alpha_i the angle between the two axes,
-//! d_i and theta_i what lies between two normals along and about the axis that they share. They differ in where a row begins:
+//! d_i and theta_i what lies between two normals along and about the axis that they share. A normal may point either way: here as the one
+//! before it, so that most theta are small. They differ in where a row begins:
 //!
 //! - standard: row i is `Rz(theta_i) · Trans_z(d_i) · Trans_x(a_i) · Rx(alpha_i)`
 //! - modified (J. J. Craig, "Introduction to Robotics"): row i is `Rx(alpha_(i-1)) · Trans_x(a_(i-1)) · Rz(theta_i) · Trans_z(d_i)`
@@ -21,6 +22,9 @@ use crate::files::JointLimits;
 const PARALLEL_RAD: f64 = 1e-9;
 /// Below this angle, radians, a user is told why the values are large: half a degree, more than a well-built arm is off.
 const NEARLY_PARALLEL_RAD: f64 = std::f64::consts::PI / 360.0;
+
+/// Axes nearer than this, metres, are taken as meeting.
+const TOUCHING_M: f64 = 1e-9;
 
 /// Which of the two tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +82,7 @@ struct Normal {
     direction: Vector3<f64>,
     from_m: Vector3<f64>,
     to_m: Vector3<f64>,
-    /// From `from_m` to `to_m` along the direction, metres.
+    /// From `from_m` to `to_m` along the direction, metres; below zero where the direction points the other way.
     a_m: f64,
     /// From axis to next axis about the direction, radians.
     alpha_rad: f64,
@@ -217,15 +221,13 @@ fn row(axis: &Axis, last: &Normal, normal: &Normal, (a_m, alpha_rad): (f64, f64)
 
 /// The common normal of two axes; of parallel ones the one that begins where the last ended.
 fn next(last: &mut Normal, axis: &Axis, other: &Axis) -> Normal {
-    const TOUCHING_M: f64 = 1e-9;
     let (z, w) = (axis.direction, other.direction);
     let cross = z.cross(&w);
     let (direction, from_m, to_m) = if cross.norm() > PARALLEL_RAD {
         let between_m = other.point_m - axis.point_m;
         let along = |u: &Vector3<f64>| between_m.cross(u).dot(&cross) / cross.norm_squared();
         let (from_m, to_m) = (axis.point_m + z * along(&w), other.point_m + w * along(&z));
-        let x = cross.normalize();
-        (if (to_m - from_m).dot(&x) < -TOUCHING_M { -x } else { x }, from_m, to_m)
+        (cross.normalize(), from_m, to_m)
     } else {
         let from_m = last.to_m;
         let to_m = other.point_m + w * w.dot(&(from_m - other.point_m));
@@ -233,10 +235,20 @@ fn next(last: &mut Normal, axis: &Axis, other: &Axis) -> Normal {
         let across_m = gap_m - z * z.dot(&gap_m);
         (across_m.try_normalize(TOUCHING_M).unwrap_or(last.direction), from_m, to_m)
     };
+    let direction = facing(direction, &last.direction, &(to_m - from_m));
     let a_m = (to_m - from_m).dot(&direction);
     let normal = Normal { direction, from_m, to_m, a_m, alpha_rad: cross.dot(&direction).atan2(z.dot(&w)) };
     *last = normal;
     normal
+}
+
+/// A normal's direction or its opposite: as the last normal points, so that a calibrated table is like its design's, where the two are not
+/// across one another; else towards the next axis.
+fn facing(direction: Vector3<f64>, last: &Vector3<f64>, gap_m: &Vector3<f64>) -> Vector3<f64> {
+    const ACROSS: f64 = 0.1;
+    let along = direction.dot(last);
+    let is_opposite = if along.abs() > ACROSS { along < 0.0 } else { gap_m.dot(&direction) < -TOUCHING_M };
+    if is_opposite { -direction } else { direction }
 }
 
 fn nearly_parallel(axes: &[Axis]) -> Vec<NearlyParallel> {
