@@ -69,7 +69,7 @@ fn fk_shows_where_the_tool_of_a_robot_with_revolute_or_prismatic_joints_is() {
 #[test]
 fn export_prints_a_file_or_writes_it_and_says_what_the_format_cannot_hold() {
     let folder = TempDir::new().expect("a temporary folder");
-    shows(&folder, "export_urdf", &["export", "--robot", "stanford", "--format", "urdf"]);
+    shows(&folder, "export_urdf", &["export", "--robot", "puma560", "--format", "urdf"]);
     shows(&folder, "export_octave", &["export", "--robot", "scara", "--format", "octave"]);
     shows(&folder, "export_dh_to_a_file", &["export", "--robot", "puma560-optimised", "--format", "dh", "--out", "dh.csv"]);
     shows(&folder, "export_mdh", &["export", "--robot", "stanford", "--format", "mdh"]);

@@ -4,9 +4,9 @@ use std::fs;
 
 use ballbar_tests::command::{Run, host_cal_in};
 use ballbar_tests::exports::{joint_vectors, pose_by_products, write_calibrated};
-use host_cal::files::{Goal, ROBOTS, Robot, Source, Target, read_targets};
+use host_cal::files::{Goal, ROBOTS, Robot, Source, Target, UrdfEnds, parse_urdf, read_targets};
 use host_cal::kinematics::{Compensation, Compensator, Unreached};
-use nalgebra::{Matrix4, Vector3};
+use nalgebra::{Matrix4, Rotation3, Vector3};
 use tempfile::TempDir;
 
 /// A built-in robot and what calibration makes of it.
@@ -123,6 +123,36 @@ fn an_arm_of_few_joints_gets_to_the_position_and_says_how_far_it_is_turned() {
     }
     let pose = commands(&real, &nominal, &format!("{POSE}400,200,100,30,0,180\n400,200,100,30,5,180\n"));
     assert_eq!(pose[1], Err(Unreached::ByNominal), "no SCARA tilts its tool");
+}
+
+#[test]
+fn an_arm_with_a_joint_to_spare_stays_near_where_it_is() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let urdf = Source::new("seven axes", include_str!("../urdf/seven_axes.urdf"));
+    let imported = parse_urdf(&urdf, UrdfEnds::default()).unwrap_or_else(|error| panic!("{error}"));
+    let design = folder.path().join("design.toml");
+    fs::write(&design, &imported.toml).expect("a file");
+    let (real, nominal) = (write_calibrated(folder.path(), &design.display().to_string()), imported.robot);
+    let header = format!("{},q7_deg,{POSE}", JOINTS.trim_end());
+    // Where the design is at 20, -40, 30, 70, 10, -50, 15, and 5 mm on.
+    let at: Vec<f64> = [20.0, -40.0, 30.0, 70.0, 10.0, -50.0, 15.0].into_iter().map(f64::to_radians).collect();
+    let wanted = pose_by_products(&nominal, &at);
+    let [roll, pitch, yaw]: [f64; 3] = {
+        let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(wanted.fixed_view::<3, 3>(0, 0).into()).euler_angles();
+        [roll, pitch, yaw].map(f64::to_degrees)
+    };
+    let row = |x_off_mm: f64| {
+        let [x, y, z]: [f64; 3] = (position(&wanted) * 1e3).into();
+        format!("20,-40,30,70,10,-50,15,{},{y},{z},{yaw},{pitch},{roll}\n", x + x_off_mm)
+    };
+    let found = commands(&real, &nominal, &format!("{header}{}{}", row(0.0), row(5.0)));
+    for (found, x_off_mm) in found.into_iter().zip([0.0, 5.0]) {
+        let found = found.unwrap();
+        let reached = position(&pose_by_products(&real, found.q.as_array()));
+        assert!((reached - position(&wanted) - Vector3::new(x_off_mm / 1e3, 0.0, 0.0)).amax() < 1e-9, "{found:?}");
+        assert!(largest_change(&found) < 0.05, "{found:?}");
+        assert!(found.nominal_q.as_array().iter().zip(&at).all(|(a, b)| (a - b).abs() < 0.05), "{found:?}");
+    }
 }
 
 #[test]

@@ -193,7 +193,8 @@ fn a_mutant_of_a_urdf_is_refused_or_becomes_a_robot_file() {
 #[test]
 fn a_mutant_of_targets_is_refused_or_has_sound_numbers() {
     let (robot, _) = good();
-    let text = "q1_deg,q2_mm,x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg\n10,100.5,400,-20.5,30,0,90,-180\n-20,150,1e2,0,3,1,2,3\n";
+    let text =
+        "q1_deg,q2_mm,x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg\n10,100.5,400,-20.5,30,0,90,-180\n-20,150,1e2,0,3,1,2,3\n";
     let read = |source: &Source| read_targets(source, &robot);
     let taken = read_mutants(text, read, |targets| {
         assert!(!targets.is_empty() && targets.iter().all(|target| target.line > 1 && !format!("{target:?}").contains("NaN")));

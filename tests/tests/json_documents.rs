@@ -188,7 +188,7 @@ fn export_documents_the_file_or_where_it_is() {
         (&urdf["out"], &urdf["text"], &urdf["largest_difference_mm"]),
         (&Value::from("s.urdf"), &Value::Null, &Value::Null)
     );
-    assert!(list(&urdf["warnings"]).iter().any(|warning| text(warning).contains("ballbar_encoder")));
+    assert!(list(&urdf["warnings"]).iter().any(|warning| text(warning).contains("effort and velocity")));
     let import = document(&folder, 0, &[&["import", "s.urdf"]]);
     assert_eq!(
         (&import["robot"], &import["base"], &import["tip"]),

@@ -17,16 +17,19 @@ use crate::units::mm_from_m;
 
 /// Write a robot as URDF, DH table, data or source code
 #[derive(Args)]
-#[command(after_help = "Example:\n  host-cal export --robot calibrated.toml --format urdf --out calibrated.urdf")]
+#[command(
+    after_help = "Example:\n  host-cal export --robot calibrated.toml --format urdf --out calibrated.urdf\n\nFormats:\n  urdf       robot description of ROS; metres and radians\n  ros2       ROS 2 parameter file with the URDF as robot_description\n  dh, mdh    Denavit-Hartenberg table, standard or modified (Craig), CSV; millimetres and degrees\n  json yaml  links, joints and limits; metres and radians\n  csv        parameters and limits; millimetres and degrees\n  c, rust    constants for firmware; metres and radians\n  octave     MATLAB or Octave function of the tool's pose; metres and radians"
+)]
 pub(super) struct ExportArgs {
     /// robot.toml, or a built-in: puma560, puma560-optimised, irb120, ur5e, stanford, scara
     #[arg(long)]
     robot: String,
-    /// What to write it as
-    #[arg(long, value_enum)]
+    /// What to write it as: urdf, ros2, dh, mdh, json, yaml, csv, c, rust, octave
+    #[arg(long, value_enum, hide_possible_values = true)]
     format: Format,
-    /// Of a URDF: where joint values are zero [default: model]
-    #[arg(long, value_enum, value_name = "WHERE")]
+    /// Where the joint values of a URDF are zero: `model`, offset + scale * encoder output; or `encoder`, scale * encoder output, with
+    /// the offsets in the origins [default: model]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "WHERE")]
     joint_zero: Option<JointZero>,
     /// File to write; printed when not given
     #[arg(long, value_name = "FILE")]

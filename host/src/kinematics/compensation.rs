@@ -109,7 +109,8 @@ impl Compensator {
         };
         let stepped = self.calibrated.reach(&nominal_q, &wanted);
         let near = stepped.filter(|q| is_near(q, &nominal_q));
-        let q = near.or_else(|| nearest_branch(&self.calibrated, &wanted, &nominal_q)).or(stepped);
+        // What is only reached beyond limits is refused by its joint.
+        let q = near.or_else(|| nearest_branch(&self.calibrated, &wanted, &nominal_q, stepped)).or(stepped);
         let q = rounded(q.ok_or(Unreached::ByCalibrated)?);
         self.check_limits(&q)?;
         let from_target = |q: &JointVector<f64>| apart(&wanted, &self.calibrated.skeleton().at(q).base_from_tool);
@@ -126,8 +127,9 @@ impl Compensator {
     fn nominal_joints(&self, pose: &Pose<f64>, near: &JointVector<f64>) -> Option<JointVector<f64>> {
         /// What the decimals of a file may turn a tool out of what an arm of few joints can do.
         const DECIMALS_RAD: f64 = 1e-3;
-        let stepped = self.nominal.reach(near, pose).filter(|q| is_near(q, near) && self.check_limits(q).is_ok());
-        let q = stepped.or_else(|| nearest_branch(&self.nominal, pose, near))?;
+        let stepped = self.nominal.reach(near, pose);
+        let q = stepped.filter(|q| is_near(q, near) && self.check_limits(q).is_ok());
+        let q = q.or_else(|| nearest_branch(&self.nominal, pose, near, stepped))?;
         let (_, turned_rad) = apart(pose, &self.nominal_forward.base_from_tool(&q));
         (turned_rad < DECIMALS_RAD && self.check_limits(&q).is_ok()).then_some(q)
     }
@@ -141,12 +143,18 @@ impl Compensator {
     }
 }
 
-/// Of all branches within limits, each joint turned as near as its limits let it, the nearest.
-fn nearest_branch(inverse: &InverseKinematics, pose: &Pose<f64>, to: &JointVector<f64>) -> Option<JointVector<f64>> {
+/// Of all branches within limits, each joint turned as near as its limits let it, the nearest. What steps from there reach is one of them,
+/// of an arm with joints to spare often the nearest of infinitely many.
+fn nearest_branch(
+    inverse: &InverseKinematics,
+    pose: &Pose<f64>,
+    to: &JointVector<f64>,
+    stepped: Option<JointVector<f64>>,
+) -> Option<JointVector<f64>> {
     const SEED: u64 = 1993;
     let branches = inverse.branches(pose, Thoroughness::ALL, &mut ChaCha8Rng::seed_from_u64(SEED));
-    let turned = branches.within_limits.iter().map(|q| inverse.turned_towards(q, to));
-    turned.min_by(|a, b| distance(a, to).total_cmp(&distance(b, to)))
+    let turned = branches.within_limits.iter().chain(&stepped).map(|q| inverse.turned_towards(q, to));
+    turned.filter(|q| inverse.is_within_limits(q)).min_by(|a, b| distance(a, to).total_cmp(&distance(b, to)))
 }
 
 /// Whether two joint vectors are too near one another to be on different branches, but for singular postures.
