@@ -19,7 +19,7 @@ use crate::units::{ScreenUnit, mm_from_m, tidy};
 /// Commands that bring a controller with its nominal model to the true targets
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  host-cal compensate --robot calibrated.toml --nominal design.toml targets.csv --out commands.csv\n\nA target is a joint vector of the controller, and means the pose that the nominal model has there, or a pose, or a pose with\njoints that say on which branch. A command is a joint vector, and the pose that the controller believes to reach by it.\nExit code 1 says that some targets cannot be reached."
+    after_help = "Example:\n  host-cal compensate --robot calibrated.toml --nominal design.toml targets.csv --out commands.csv\n\nA target is a joint vector of the controller, and means the pose that the nominal model has there, or a pose, or a pose with joints that say on which branch. A command is a joint vector, and the pose that the controller believes to reach by it.\nExit code 1 says that some targets cannot be reached."
 )]
 pub(super) struct CompensateArgs {
     /// The calibrated robot.toml

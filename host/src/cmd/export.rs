@@ -18,7 +18,7 @@ use crate::units::mm_from_m;
 /// Write a robot as URDF, DH table, data or source code
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  host-cal export --robot calibrated.toml --format urdf --out calibrated.urdf\n\nFormats:\n  urdf       robot description of ROS; metres and radians\n  ros2       ROS 2 parameter file with the URDF as robot_description\n  dh, mdh    Denavit-Hartenberg table, standard or modified (Craig), CSV; millimetres and degrees\n  json yaml  links, joints and limits; metres and radians\n  csv        parameters and limits; millimetres and degrees\n  c, rust    constants for firmware; metres and radians\n  octave     MATLAB or Octave function of the tool's pose; metres and radians"
+    after_help = "Example:\n  host-cal export --robot calibrated.toml --format urdf --out calibrated.urdf\n\nFormats:\n  urdf        robot description of ROS; metres and radians\n  ros2        ROS 2 parameter file with the URDF as robot_description\n  dh, mdh     Denavit-Hartenberg table, standard or modified (Craig), CSV; millimetres and degrees\n  json, yaml  links, joints and limits; metres and radians\n  csv         parameters and limits; millimetres and degrees\n  c, rust     constants for firmware; metres and radians\n  octave      MATLAB or Octave function of the tool's pose; metres and radians"
 )]
 pub(super) struct ExportArgs {
     /// robot.toml, or a built-in: puma560, puma560-optimised, irb120, ur5e, stanford, scara
