@@ -17,6 +17,15 @@ pub fn tidy(value: f64) -> f64 {
     (value * 1e9).round() / 1e9
 }
 
+/// A computed number for a file: what is within 1e-12 of a number with nine decimals becomes that number, so that rounding on the way
+/// leaves no `90.00000000000001`. All others keep their digits.
+pub fn without_noise(value: f64) -> f64 {
+    const NOISE: f64 = 1e-12;
+    let short = tidy(value);
+    // The sum takes the sign from zero.
+    if (short - value).abs() < NOISE { short + 0.0 } else { value }
+}
+
 /// A unit as files and screens have it, and its size in SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ScreenUnit {

@@ -10,6 +10,7 @@ pub mod data;
 #[cfg(unix)]
 pub mod emulator;
 pub mod experiment;
+pub mod exports;
 pub mod fake_board;
 pub mod fake_hardware;
 pub mod naive;

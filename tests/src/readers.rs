@@ -22,7 +22,12 @@ pub fn is_skipped() -> bool {
 pub fn python(script: &str, arguments: &[&Path]) -> String {
     let environment = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
     let python = environment.join("readers/bin/python");
-    output(Command::new(python).arg(workspace().join("tests/readers").join(script)).args(arguments))
+    output(Command::new(python).arg(reader(script)).args(arguments))
+}
+
+/// A file of `tests/readers/`.
+pub fn reader(name: &str) -> PathBuf {
+    workspace().join("tests/readers").join(name)
 }
 
 /// Evaluates Octave's code in a directory; its standard output.

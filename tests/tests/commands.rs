@@ -18,7 +18,7 @@ fn snapshot(name: &str, command: &[&str], text: &str) {
         omit_expression => true,
         filters => vec![
             (r#"when = "\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ""#, "when = [TIME]"),
-            (r"\b\de-1[0-9]\b", "[ROUNDING]"),
+            (r"\b\d(\.\d)?e-1[0-9]\b", "[ROUNDING]"),
             (r"(\d\.\d{6})\d{4,}", "$1…"),
         ],
     }, {
@@ -48,7 +48,9 @@ fn help_says_what_each_command_is_for_and_how_to_begin() {
     shows(&folder, "help", &["--help"]);
     let with_a_board = ["ports", "stream", "log", "status", "home", "lvdt", "apply", "pose", "virtual-board"];
     for command in
-        ["fit", "validate", "rank", "report", "fk", "plan", "simulate", "paper", "demo"].into_iter().chain(with_a_board)
+        ["fit", "validate", "rank", "report", "fk", "export", "import", "compensate", "plan", "simulate", "paper", "demo"]
+            .into_iter()
+            .chain(with_a_board)
     {
         let long = shows(&folder, &format!("help_{command}"), &[command, "--help"]);
         assert_eq!(long.stdout, runs(&folder, &[&["help", command]]).stdout);
@@ -62,6 +64,25 @@ fn fk_shows_where_the_tool_of_a_robot_with_revolute_or_prismatic_joints_is() {
     let folder = TempDir::new().expect("a temporary folder");
     shows(&folder, "fk_revolute", &["fk", "--robot", "puma560", "--q", "10,-40,100,20,-30,50"]);
     shows(&folder, "fk_prismatic", &["fk", "--robot", "stanford", "--q", "10,-40,500,20,-30,50"]);
+}
+
+#[test]
+fn export_prints_a_file_or_writes_it_and_says_what_the_format_cannot_hold() {
+    let folder = TempDir::new().expect("a temporary folder");
+    shows(&folder, "export_urdf", &["export", "--robot", "puma560", "--format", "urdf"]);
+    shows(&folder, "export_octave", &["export", "--robot", "scara", "--format", "octave"]);
+    shows(&folder, "export_dh_to_a_file", &["export", "--robot", "puma560-optimised", "--format", "dh", "--out", "dh.csv"]);
+    shows(&folder, "export_mdh", &["export", "--robot", "stanford", "--format", "mdh"]);
+    let no_urdf = host_cal_in(folder.path(), &["export", "--robot", "scara", "--format", "c", "--joint-zero", "encoder"]);
+    snapshot("export_refused", &["export", "--format", "c", "--joint-zero", "encoder"], &no_urdf.transcript());
+}
+
+#[test]
+fn import_writes_a_robot_file_of_what_export_wrote() {
+    let folder = TempDir::new().expect("a temporary folder");
+    runs(&folder, &[&["export", "--robot", "scara", "--format", "urdf", "--joint-zero", "encoder", "--out", "scara.urdf"]]);
+    shows(&folder, "import_to_a_file", &["import", "scara.urdf", "--out", "scara.toml"]);
+    snapshot("imported_toml", &["import", "scara.urdf"], &read(&folder, "scara.toml"));
 }
 
 #[test]

@@ -4,12 +4,11 @@ use std::f64::consts::PI;
 use std::fs;
 
 use ballbar::JointKind;
-use ballbar_tests::naive;
-use host_cal::export::{Format, export};
-use host_cal::files::{Imported, ROBOTS, Robot, Source, UrdfEnds, read_targets, read_urdf};
-use host_cal::kinematics::{Compensator, Convention, DhTable};
-use nalgebra::{Isometry3, Matrix4, Translation3, Unit, UnitQuaternion, Vector3};
-use num_complex::Complex;
+use ballbar_tests::exports::{joint_vectors, pose_by_products as pose};
+use host_cal::export::{Format, JointZero, export};
+use host_cal::files::{Imported, ROBOTS, Robot, Source, UrdfEnds, read_urdf};
+use host_cal::kinematics::{Convention, DhTable};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
@@ -21,22 +20,6 @@ fn imported(text: &str, ends: UrdfEnds<'_>) -> Result<Imported, String> {
     let path = folder.path().join("robot.urdf");
     fs::write(&path, text).expect("a file");
     read_urdf(&path, ends).map_err(|error| error.to_string().replace(&path.display().to_string(), "robot.urdf"))
-}
-
-/// The tool's pose, by complex 4×4 products of the file's parameters.
-fn pose(robot: &Robot, q: &[f64]) -> Matrix4<f64> {
-    let parameters: Vec<Complex<f64>> = robot.chain.parameters().iter().map(|&value| value.into()).collect();
-    naive::base_from_tool(robot.chain.joint_kinds(), &parameters, q).map(|entry| entry.re)
-}
-
-/// Joint vectors over the limits, corners among them.
-fn joint_vectors(robot: &Robot) -> Vec<Vec<f64>> {
-    let at = |share: f64, i: usize| (share + 0.37 * i as f64).fract();
-    let vector = |step: usize| {
-        let joints = robot.limits.iter().enumerate();
-        joints.map(|(i, limits)| limits.min + (limits.max - limits.min) * at(step as f64 / 20.0, i)).collect()
-    };
-    (0..20).map(vector).collect()
 }
 
 /// A robot of 1 to 8 joints of either kind, nothing aligned, as the text of its file.
@@ -61,13 +44,19 @@ fn robots() -> impl Strategy<Value = Robot> {
 }
 
 fn survives_urdf(robot: &Robot) {
-    let text = export(robot, Format::Urdf).text;
+    for zero in [JointZero::Model, JointZero::Encoder] {
+        survives_a_urdf_with(robot, zero);
+    }
+}
+
+fn survives_a_urdf_with(robot: &Robot, zero: JointZero) {
+    let text = export(robot, Format::Urdf, zero).text;
     let again = imported(&text, UrdfEnds::default()).unwrap_or_else(|error| panic!("{error}\n{text}")).robot;
     assert_eq!(again.name, robot.name);
     for (before, after) in robot.limits.iter().zip(&again.limits) {
         assert!((before.min - after.min).abs() < ROUNDING && (before.max - after.max).abs() < ROUNDING, "{before:?} {after:?}");
     }
-    for q in joint_vectors(robot) {
+    for q in joint_vectors(robot, 20) {
         let off = (pose(robot, &q) - pose(&again, &q)).amax();
         assert!(off < ROUNDING, "{off:e} at {q:?}");
     }
@@ -85,7 +74,7 @@ proptest! {
             let table = DhTable::new(&robot.chain, convention);
             // Two axes taken at random are nearly parallel once in thousands.
             prop_assume!(table.nearly_parallel.is_empty());
-            for q in joint_vectors(&robot) {
+            for q in joint_vectors(&robot, 20) {
                 let theirs = table.base_from_tool(&q);
                 let ours = pose(&robot, &q);
                 let off_m = (ours.fixed_view::<3, 1>(0, 3) - theirs.translation_m).amax();
@@ -112,23 +101,26 @@ fn the_built_in_robots_survive_a_urdf_and_both_tables() {
 fn the_table_of_the_ur5e_is_the_one_that_its_maker_publishes() {
     let robot = Robot::open("ur5e").unwrap();
     let table = DhTable::new(&robot.chain, Convention::Standard);
-    // Universal Robots: a, d in metres; the signs of a and the turns of theta that go with them are a matter of choice.
-    let (a, d) = ([0.0, 0.425, 0.3922, 0.0, 0.0, 0.0], [0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996]);
+    // Universal Robots, "DH Parameters for calculations of kinematics and dynamics": metres, theta zero.
+    let (a, d) = ([0.0, -0.425, -0.3922, 0.0, 0.0, 0.0], [0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996]);
+    let alpha = [PI / 2.0, 0.0, 0.0, PI / 2.0, -PI / 2.0, 0.0];
     for (i, row) in table.rows.iter().enumerate() {
-        assert!((row.a_m.abs() - a[i]).abs() < 1e-12, "a{} = {}", i + 1, row.a_m);
-        assert!((row.d_m.abs() - d[i]).abs() < 1e-12, "d{} = {}", i + 1, row.d_m);
+        let off = [row.a_m - a[i], row.d_m - d[i], row.alpha_rad - alpha[i], row.theta_rad];
+        assert!(off.iter().all(|off| off.abs() < 1e-12), "row {}: {row:?}", i + 1);
     }
+    let nothing = |pose: &ballbar::Pose<f64>| pose.translation_m.amax() + (pose.rotation - ballbar::Matrix3::identity()).amax();
+    assert!(nothing(&table.base_from_first) < 1e-12 && nothing(&table.last_from_tool) < 1e-12, "{table:?}");
     assert!(table.nearly_parallel.is_empty(), "exactly parallel axes are no trouble");
 }
 
 #[test]
 fn nearly_parallel_axes_are_explained() {
-    let optimised = export(&Robot::open("puma560-optimised").unwrap(), Format::Dh);
+    let optimised = export(&Robot::open("puma560-optimised").unwrap(), Format::Dh, JointZero::Model);
     assert!(
         optimised.remarks.iter().any(|remark| remark.contains("axes 2 and 3") && remark.contains("no fault")),
         "{optimised:?}"
     );
-    assert!(export(&Robot::open("puma560").unwrap(), Format::Dh).remarks.is_empty());
+    assert!(export(&Robot::open("puma560").unwrap(), Format::Dh, JointZero::Model).remarks.is_empty());
 }
 
 const ODD_AXES: &str = r#"<robot name="odd">
@@ -204,7 +196,14 @@ fn hostile_files_are_refused_clearly() {
     let two_parents = robot(&["a", "b", "c"], &[joint("1", "a", "c"), joint("2", "b", "c")]);
     assert!(refusal(&two_parents).contains("child of two joints"));
     assert!(refusal(&robot(&["a", "b"], &[])).contains("2 links have no joint above them: a, b"));
-    assert!(refusal(&robot(&["a", "b", "c"], &[joint("1", "a", "b"), joint("2", "a", "c")])).contains("several ends"));
+    let fork = robot(&["a", "b", "c"], &[joint("1", "a", "b"), joint("2", "a", "c")]);
+    assert!(refusal(&fork).contains("several ends"));
+    for (base, tip, says) in
+        [("b", "c", "no joints lead from the base"), ("a", "d", "--tip `d` is no link"), ("d", "b", "--base `d`")]
+    {
+        let refusal = imported(&fork, UrdfEnds { base: Some(base), tip: Some(tip) }).unwrap_err();
+        assert!(refusal.contains(says), "{refusal}");
+    }
     assert!(refusal(&robot(&["a"], &[])).contains("0 joints, expected 1 to 8"));
     let names: Vec<String> = (0..10).map(|i| format!("l{i}")).collect();
     let nine: Vec<String> = (0..9).map(|i| joint(&format!("j{i}"), &names[i], &names[i + 1])).collect();
@@ -218,7 +217,9 @@ fn hostile_files_are_refused_clearly() {
         ("xyz=\"0 0 1\"", "xyz=\"0 1e99 1\"", "`0 1e99 1`"),
         ("\"continuous\"", "\"planar\"", "type of joint `j` is `planar`"),
         ("\"continuous\"", "\"revolute\"", "<limit> of joint `j` is missing"),
-        ("<axis", "<mimic joint=\"k\"/><axis", "<mimic> of joint `j`"),
+        ("<axis", "<mimic joint=\"k\"/><axis", "joint `j` is moved along by another"),
+        ("\"0 0 1\"", "\"0 0 ${pi}\"", "this is xacro"),
+        ("<link", "<x:macro xmlns:x=\"http://www.ros.org/wiki/xacro\"/><link", "this is xacro"),
         ("<robot", "<sdf", "not XML"),
     ] {
         let refusal = refusal(&two.replacen(found, broken, 1));
@@ -238,35 +239,4 @@ fn large_files_take_no_long_time() {
         assert!(refusal.len() < 600, "{refusal}");
     }
     assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
-}
-
-#[test]
-fn a_compensated_controller_brings_the_tool_to_the_target() {
-    let (real, nominal) = (Robot::open("puma560-optimised").unwrap(), Robot::open("puma560").unwrap());
-    // The elbow well bent: near a straight arm (q3 = 90) millimetres turn it by many degrees.
-    let text = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,-40,160,20,-50,50\n-60,-100,30,-20,40,0\n";
-    let targets = read_targets(&Source::new("targets", text), &nominal).unwrap();
-    let compensator = Compensator::new(&real, &nominal);
-    for target in &targets {
-        let found = compensator.compensate(target, |q| q).unwrap();
-        let q = target.q.as_array();
-        let wanted = pose(&nominal, q);
-        let off = |q: &[f64]| (pose(&real, q) - wanted).amax();
-        assert!(off(q) > 1e-3 && off(found.q.as_array()) < 1e-9, "{} {}", off(q), off(found.q.as_array()));
-        assert!(found.before.0 > 1e-3 && found.left.0 < 1e-9, "{found:?}");
-        let largest = found.q.as_array().iter().zip(q).map(|(new, old)| (new - old).abs()).fold(0.0, f64::max);
-        assert!(largest < 0.2, "another branch: {:?} of {q:?}", found.q);
-        let believed = found.nominal_base_from_tool.translation_m;
-        assert!((pose(&nominal, found.q.as_array()).fixed_view::<3, 1>(0, 3) - believed).amax() < ROUNDING);
-    }
-
-    let with_pose = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg\n\
-                     0,-45,135,0,30,0,500,150,600,0,90,0\n0,-45,135,0,30,0,9000,150,600,0,90,0\n";
-    let targets = read_targets(&Source::new("targets", with_pose), &nominal).unwrap();
-    let found = compensator.compensate(&targets[0], |q| q).unwrap();
-    let reached = pose(&real, found.q.as_array());
-    assert!((reached.fixed_view::<3, 1>(0, 3) - Vector3::new(0.5, 0.15, 0.6)).amax() < 1e-9, "{reached}");
-    assert!(compensator.compensate(&targets[1], |q| q).is_none(), "nine metres are out of reach");
-    let half = read_targets(&Source::new("targets", &with_pose.replace(",gamma_deg", "").replace(",0\n", "\n")), &nominal);
-    assert!(half.unwrap_err().to_string().contains("`gamma_deg` is missing"));
 }

@@ -3,7 +3,7 @@
 #[expect(dead_code, reason = "refusals are counted elsewhere")]
 mod workbench;
 
-use host_cal::files::{Calibration, Dataset, InputError, Rig, Robot, Source, write_poses};
+use host_cal::files::{Calibration, Dataset, InputError, Rig, Robot, Source, UrdfEnds, parse_urdf, read_targets, write_poses};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use workbench::{POSES, RIG, ROBOT, Workbench};
@@ -80,7 +80,7 @@ fn read_mutants<T>(text: &str, read: impl Fn(&Source) -> Result<T, InputError>, 
                 is_sound(&value);
                 taken += 1;
             }
-            Err(error) => assert!(error.to_string().starts_with("mutant:"), "{error}"),
+            Err(error) => assert!(error.to_string().starts_with("mutant"), "{error}"),
         }
     }
     taken
@@ -174,6 +174,31 @@ fn a_mutant_of_poses_is_refused_or_has_sound_rows_that_can_be_written_and_read_a
         }
     };
     let taken = read_mutants(&full_poses(), read, is_sound);
+    assert!((MUTANTS / 20..MUTANTS * 3 / 4).contains(&taken), "{taken} files taken: the mutants are too mild or too wild");
+}
+
+#[test]
+fn a_mutant_of_a_urdf_is_refused_or_becomes_a_robot_file() {
+    let ends = UrdfEnds { base: None, tip: Some("gripper") };
+    let read = |source: &Source| parse_urdf(source, ends);
+    let is_sound = |imported: &host_cal::files::Imported| {
+        let again = Robot::parse(&Source::new("imported", &imported.toml)).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(again.chain.parameters(), imported.robot.chain.parameters());
+        assert!(again.limits.iter().all(|limits| limits.min < limits.max));
+    };
+    let taken = read_mutants(include_str!("../urdf/scara.urdf"), read, is_sound);
+    assert!((MUTANTS / 20..MUTANTS * 3 / 4).contains(&taken), "{taken} files taken: the mutants are too mild or too wild");
+}
+
+#[test]
+fn a_mutant_of_targets_is_refused_or_has_sound_numbers() {
+    let (robot, _) = good();
+    let text =
+        "q1_deg,q2_mm,x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg\n10,100.5,400,-20.5,30,0,90,-180\n-20,150,1e2,0,3,1,2,3\n";
+    let read = |source: &Source| read_targets(source, &robot);
+    let taken = read_mutants(text, read, |targets| {
+        assert!(!targets.is_empty() && targets.iter().all(|target| target.line > 1 && !format!("{target:?}").contains("NaN")));
+    });
     assert!((MUTANTS / 20..MUTANTS * 3 / 4).contains(&taken), "{taken} files taken: the mutants are too mild or too wild");
 }
 

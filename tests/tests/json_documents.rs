@@ -167,6 +167,66 @@ fn fk_documents_the_pose_of_the_tool() {
 }
 
 #[test]
+fn export_documents_the_file_or_where_it_is() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let dh = document(&folder, 0, &[&["export", "--robot", "puma560-optimised", "--format", "dh"]]);
+    assert_eq!((text(&dh["robot"]), text(&dh["format"]), &dh["calibrated"]), ("PUMA 560 (optimised)", "dh", &Value::from(false)));
+    assert!(text(&dh["text"]).contains("joint,type,theta_deg,d_mm,a_mm,alpha_deg,scale\n") && dh["out"].is_null());
+    // Axes 2 and 3 meet 100 m away.
+    assert!(
+        (0.0..1e-8).contains(&number(&dh["largest_difference_mm"]))
+            && (0.0..1e-8).contains(&number(&dh["largest_difference_deg"]))
+    );
+    assert_eq!(list(&dh["nearly_parallel"]).len(), 1);
+    let pair = &dh["nearly_parallel"][0];
+    assert_eq!((&pair["joints"][0], &pair["joints"][1]), (&Value::from(2), &Value::from(3)));
+    near(&pair["angle_deg"], 0.18, 0.01);
+    assert!(text(&list(&dh["warnings"])[0]).contains("axes 2 and 3"));
+
+    let urdf = document(&folder, 0, &[&["export", "--robot", "stanford", "--format", "urdf", "--out", "s.urdf"]]);
+    assert_eq!(
+        (&urdf["out"], &urdf["text"], &urdf["largest_difference_mm"]),
+        (&Value::from("s.urdf"), &Value::Null, &Value::Null)
+    );
+    assert!(list(&urdf["warnings"]).iter().any(|warning| text(warning).contains("effort and velocity")));
+    let import = document(&folder, 0, &[&["import", "s.urdf"]]);
+    assert_eq!(
+        (&import["robot"], &import["base"], &import["tip"]),
+        (&Value::from("Stanford arm"), &Value::from("base"), &Value::from("tool"))
+    );
+    let joints: Vec<&str> = list(&import["joints"]).iter().map(text).collect();
+    assert_eq!(joints, ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6"]);
+    assert!(text(&import["text"]).contains("type = \"prismatic\"") && list(&import["warnings"]).is_empty());
+}
+
+#[test]
+fn compensate_documents_each_command_and_each_target_without_one() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let targets = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,-40,160,20,-50,50\n159.999,-40,160,20,-50,50\n";
+    fs::write(folder.path().join("targets.csv"), targets).expect("a file");
+    let robots = ["compensate", "--robot", "puma560-optimised", "--nominal", "puma560", "targets.csv", "--out", "commands.csv"];
+    let document = document(&folder, 1, &[&robots]);
+    assert_eq!((count(&document["targets"]), &document["out"]), (2, &Value::from("commands.csv")));
+    let [command] = list(&document["commands"]) else { panic!("{document}") };
+    assert_eq!(count(&command["line"]), 2);
+    for (joint, nominal) in [10.0, -40.0, 160.0, 20.0, -50.0, 50.0].into_iter().enumerate() {
+        near(&command["nominal_q"][joint], nominal, 1e-9);
+        near(&command["q"][joint], nominal, 6.0);
+        assert!(number(&command["q"][joint]) != nominal);
+    }
+    assert_eq!((list(&command["position_mm"]).len(), list(&command["alpha_beta_gamma_deg"]).len()), (3, 3));
+    assert!(number(&command["before_mm"]) > 1.0 && number(&command["before_deg"]) > 0.1, "{command}");
+    assert!(number(&command["left_mm"]) < 1e-6 && number(&command["left_deg"]) < 1e-6, "{command}");
+    let [missed] = list(&document["not_reached"]) else { panic!("{document}") };
+    assert_eq!(count(&missed["line"]), 3);
+    assert!(text(&missed["why"]).starts_with("joint 1 would have to go to 160."), "{missed}");
+    for (largest, of) in [("largest_before_mm", "before_mm"), ("largest_left_mm", "left_mm"), ("largest_left_deg", "left_deg")] {
+        assert_eq!(document[largest], command[of]);
+    }
+    assert_eq!(list(&document["warnings"]).len(), 2, "no calibration, and the second target: {document}");
+}
+
+#[test]
 fn simulate_paper_and_demo_document_the_same_as_their_text() {
     let folder = TempDir::new().expect("a temporary folder");
     let simulate =

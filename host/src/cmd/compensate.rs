@@ -1,25 +1,25 @@
-//! `host-cal compensate`: joint commands for a controller that keeps its nominal model.
+//! `host-cal compensate`: commands for a controller that keeps its nominal model.
 
 use std::path::PathBuf;
 
-use ballbar::JointVector;
+use ballbar::{JointKind, JointVector};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::inputs::OutputArgs;
+use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use super::table::{Columns, fixed};
-use crate::files::{Robot, Source, compensated_csv, read_targets};
-use crate::kinematics::{Compensation, Compensator};
-use crate::units::{ScreenUnit, mm_from_m};
+use crate::files::{Robot, Source, Target, compensated_csv, read_targets};
+use crate::kinematics::{Compensation, Compensator, link_angles};
+use crate::units::{ScreenUnit, mm_from_m, tidy};
 
-/// Joint commands that bring a controller with its nominal model to the true targets
+/// Commands that bring a controller with its nominal model to the true targets
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  host-cal compensate --robot calibrated.toml --nominal design.toml targets.csv --out commands.csv\n\nA target is a joint vector of the controller, and means the pose that the nominal model has there, or the pose beside it.\nExit code 1 says that some targets cannot be reached."
+    after_help = "Example:\n  host-cal compensate --robot calibrated.toml --nominal design.toml targets.csv --out commands.csv\n\nA target is a joint vector of the controller, and means the pose that the nominal model has there, or a pose, or a pose with joints that say on which branch. A command is a joint vector, and the pose that the controller believes to reach by it.\nExit code 1 says that some targets cannot be reached."
 )]
 pub(super) struct CompensateArgs {
     /// The calibrated robot.toml
@@ -28,7 +28,11 @@ pub(super) struct CompensateArgs {
     /// robot.toml of the controller's own model, or a built-in
     #[arg(long)]
     nominal: String,
-    /// Targets: q1_deg,… and for poses also x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg
+    /// Where the arm stands before the first target, if that is a pose: the branch nearest to it is taken; in degrees, or millimetres for
+    /// a prismatic joint [default: the middle of the joints' ranges]
+    #[arg(long, value_name = "Q,…", value_delimiter = ',', allow_hyphen_values = true)]
+    start: Option<Vec<f64>>,
+    /// Targets: q1_deg,…, or x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg, or both
     targets: PathBuf,
     /// File of commands to write
     #[arg(long, value_name = "FILE")]
@@ -50,8 +54,10 @@ struct CompensateReport {
     not_reached: Vec<NotReached>,
     largest_before_mm: f64,
     largest_left_mm: f64,
+    largest_left_deg: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<PathBuf>,
+    warnings: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -60,6 +66,11 @@ struct CommandLine {
     line: usize,
     /// Degrees, or millimetres of a prismatic joint.
     q: Vec<f64>,
+    /// Where the controller would go by itself.
+    nominal_q: Vec<f64>,
+    /// The pose that the controller believes to reach by `q`.
+    position_mm: [f64; 3],
+    alpha_beta_gamma_deg: [f64; 3],
     before_mm: f64,
     before_deg: f64,
     left_mm: f64,
@@ -69,7 +80,7 @@ struct CommandLine {
 #[derive(Serialize)]
 struct NotReached {
     line: usize,
-    why: &'static str,
+    why: String,
 }
 
 impl CompensateArgs {
@@ -78,38 +89,71 @@ impl CompensateArgs {
         if robot.chain.joint_kinds() != nominal.chain.joint_kinds() {
             return Err(DifferentJoints(self.robot.clone(), self.nominal.clone()).into());
         }
-        if robot.calibration.is_none() {
-            warn("the robot has no [calibration]: its file says nothing of having been fitted");
-        }
-        let targets = read_targets(&Source::read(&self.targets)?, &nominal)?;
         let compensator = Compensator::new(&robot, &nominal);
-        let (mut done, mut not_reached) = (Vec::new(), Vec::new());
-        for target in &targets {
-            match compensator.compensate(target, |q| as_written(&robot, q)) {
-                None => not_reached
-                    .push(NotReached { line: target.line, why: "the calibrated robot does not get there on this branch" }),
-                Some(found) if !is_within_limits(&robot, &found.q) => {
-                    not_reached.push(NotReached { line: target.line, why: "a joint would go beyond its limits" });
-                }
-                Some(found) => done.push((target.line, found)),
-            }
-        }
-        for missed in &not_reached {
-            warn(&format!("{}:{}: {}", self.targets.display(), missed.line, missed.why));
-        }
+        let start = self.start(&nominal, &compensator)?;
+        let targets = read_targets(&Source::read(&self.targets)?, &nominal)?;
+        let (done, not_reached) = compensated(&robot, &compensator, &targets, start);
+        let warnings = self.warnings(&robot, &done, &not_reached);
+        warnings.iter().for_each(|warning| warn(warning));
         if let Some(path) = &self.out {
             write_file(path, &compensated_csv(&robot, &done))?;
         }
-        let report = self.report(&robot, &done, not_reached);
+        let report = self.report(&robot, &done, not_reached, warnings);
         print(&report, self.output.json)?;
         Ok(if report.not_reached.is_empty() { Outcome::Good } else { Outcome::Doubtful })
     }
 
-    fn report(&self, robot: &Robot, done: &[(usize, Compensation)], not_reached: Vec<NotReached>) -> CompensateReport {
+    fn start(&self, robot: &Robot, compensator: &Compensator) -> Result<JointVector<f64>, CommandError> {
+        let Some(start) = &self.start else { return Ok(compensator.middle()) };
         let kinds = robot.chain.joint_kinds();
+        let wrong_count = || ListError::JointValues { flag: "--start", found: start.len(), expected: kinds.len() };
+        if start.len() != kinds.len() {
+            return Err(wrong_count().into());
+        }
+        if let Some(value) = start.iter().find(|value| !value.is_finite()) {
+            return Err(ListError::Number { flag: "--start", found: value.to_string(), expected: "finite numbers" }.into());
+        }
+        let q: Vec<f64> = start.iter().zip(kinds).map(|(&q, &kind)| ScreenUnit::from(kind).to_si(q)).collect();
+        robot.chain.joint_vector(&q).map_err(|_| wrong_count().into())
+    }
+
+    fn warnings(&self, robot: &Robot, done: &[(usize, Compensation)], not_reached: &[NotReached]) -> Vec<String> {
+        let place = |line: usize| format!("{}:{line}", self.targets.display());
+        let mut warnings = Vec::new();
+        if robot.calibration.is_none() {
+            warnings.push("the robot has no [calibration]: its file says nothing of having been fitted".to_owned());
+        }
+        warnings.extend(not_reached.iter().map(|missed| format!("{}: {}", place(missed.line), missed.why)));
+        for (line, found) in done {
+            if let Some((joint, turn_rad)) = far_turn(robot, found) {
+                warnings.push(format!(
+                    "{}: joint {joint} turns by {:.1} degrees from where the controller's model has it: the arm is nearly singular there, \
+                     or on another branch",
+                    place(*line),
+                    turn_rad.to_degrees()
+                ));
+            }
+        }
+        warnings
+    }
+
+    fn report(
+        &self,
+        robot: &Robot,
+        done: &[(usize, Compensation)],
+        not_reached: Vec<NotReached>,
+        warnings: Vec<String>,
+    ) -> CompensateReport {
+        let kinds = robot.chain.joint_kinds();
+        let on_screen = |q: &JointVector<f64>| {
+            kinds.iter().zip(q.as_array()).map(|(&kind, &q)| tidy(ScreenUnit::from(kind).from_si(q))).collect::<Vec<f64>>()
+        };
         let line = |(line, found): &(usize, Compensation)| CommandLine {
             line: *line,
-            q: kinds.iter().zip(found.q.as_array()).map(|(&kind, &q)| ScreenUnit::from(kind).from_si(q)).collect(),
+            q: on_screen(&found.q),
+            nominal_q: on_screen(&found.nominal_q),
+            position_mm: found.nominal_base_from_tool.translation_m.map(mm_from_m).into(),
+            alpha_beta_gamma_deg: link_angles(&found.nominal_base_from_tool.rotation).map(f64::to_degrees),
             before_mm: mm_from_m(found.before.0),
             before_deg: found.before.1.to_degrees(),
             left_mm: mm_from_m(found.left.0),
@@ -121,11 +165,44 @@ impl CompensateArgs {
             targets: commands.len() + not_reached.len(),
             largest_before_mm: largest(|line| line.before_mm),
             largest_left_mm: largest(|line| line.left_mm),
+            largest_left_deg: largest(|line| line.left_deg),
             commands,
             not_reached,
             out: self.out.clone(),
+            warnings,
         }
     }
+}
+
+/// Commands with the lines of their targets, and the targets that have none. Each row's branch is the one nearest to the row before.
+fn compensated(
+    robot: &Robot,
+    compensator: &Compensator,
+    targets: &[Target],
+    start: JointVector<f64>,
+) -> (Vec<(usize, Compensation)>, Vec<NotReached>) {
+    let (mut done, mut not_reached) = (Vec::new(), Vec::new());
+    let mut before = start;
+    for target in targets {
+        match compensator.compensate(&target.goal, &before, |q| as_written(robot, q)) {
+            Ok(found) => {
+                before = found.nominal_q;
+                done.push((target.line, found));
+            }
+            Err(why) => not_reached.push(NotReached { line: target.line, why: why.to_string() }),
+        }
+    }
+    (done, not_reached)
+}
+
+/// The joint that turns farthest from where the controller would have it, and by how much, radians, if that is far.
+fn far_turn(robot: &Robot, found: &Compensation) -> Option<(usize, f64)> {
+    /// Five degrees: more than any calibration moves a joint by, away from singular postures.
+    const FAR_RAD: f64 = std::f64::consts::PI / 36.0;
+    let turns = found.q.as_array().iter().zip(found.nominal_q.as_array()).map(|(new, old)| (new - old).abs());
+    let joints = turns.zip(robot.chain.joint_kinds()).enumerate().filter(|(_, (_, kind))| **kind == JointKind::Revolute);
+    let farthest = joints.max_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(i, (turn_rad, _))| (i + 1, turn_rad));
+    farthest.filter(|(_, turn_rad)| *turn_rad > FAR_RAD)
 }
 
 /// Joints as a file has them: to the nanodegree and the nanometre.
@@ -138,34 +215,27 @@ fn as_written(robot: &Robot, mut q: JointVector<f64>) -> JointVector<f64> {
     q
 }
 
-fn is_within_limits(robot: &Robot, q: &JointVector<f64>) -> bool {
-    robot.limits.iter().zip(q.as_array()).all(|(limits, &q)| limits.contain(q))
-}
-
 impl Report for CompensateReport {
     fn text(&self) -> String {
         const SHOWN: usize = 20;
-        let mut table = Columns::new(&["line", "<q (deg or mm)", "before mm", "left mm", "left deg"]);
-        for line in self.commands.iter().take(SHOWN) {
-            let q = line.q.iter().map(|&q| fixed(q, 4)).collect::<Vec<_>>().join(" ");
-            table.row([
-                line.line.to_string(),
-                q,
-                fixed(line.before_mm, 4),
-                format!("{:.1e}", line.left_mm),
-                format!("{:.1e}", line.left_deg),
-            ]);
+        let mut text = String::new();
+        if !self.commands.is_empty() {
+            let mut table = Columns::new(&["line", "<joints to command, deg or mm", "before mm", "left mm", "left deg"]);
+            for line in self.commands.iter().take(SHOWN) {
+                let q = line.q.iter().map(|&q| fixed(q, 4)).collect::<Vec<_>>().join(" ");
+                let left = [line.left_mm, line.left_deg].map(|left| fixed(left, 6));
+                table.row([line.line.to_string(), q, fixed(line.before_mm, 4)].into_iter().chain(left));
+            }
+            text += &table.text();
         }
-        let mut text = table.text();
         if self.commands.len() > SHOWN {
             text += &format!("  and {} more\n", self.commands.len() - SHOWN);
         }
         text += &format!("{} of {} targets have a command\n", self.commands.len(), self.targets);
-        text += &format!(
-            "largest error by the calibrated robot: {} mm before, {:.1e} mm left\n",
-            fixed(self.largest_before_mm, 4),
-            self.largest_left_mm
-        );
+        if !self.commands.is_empty() {
+            let [before, left] = [(self.largest_before_mm, 4), (self.largest_left_mm, 6)].map(|(mm, digits)| fixed(mm, digits));
+            text += &format!("largest error by the calibrated robot: {before} mm before, {left} mm left\n");
+        }
         if let Some(out) = &self.out {
             text += &format!("written to {}\n", out.display());
         }

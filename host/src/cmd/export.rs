@@ -2,26 +2,35 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use miette::Diagnostic;
 use serde::Serialize;
+use thiserror::Error;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
-use crate::export::{Format, export};
+use crate::export::{Format, JointZero, export};
 use crate::files::Robot;
+use crate::kinematics::NearlyParallel;
 use crate::units::mm_from_m;
 
 /// Write a robot as URDF, DH table, data or source code
 #[derive(Args)]
-#[command(after_help = "Example:\n  host-cal export --robot calibrated.toml --format urdf --out calibrated.urdf")]
+#[command(
+    after_help = "Example:\n  host-cal export --robot calibrated.toml --format urdf --out calibrated.urdf\n\nFormats:\n  urdf        robot description of ROS; metres and radians\n  ros2        ROS 2 parameter file with the URDF as robot_description\n  dh, mdh     Denavit-Hartenberg table, standard or modified (Craig), CSV; millimetres and degrees\n  json, yaml  links, joints and limits; metres and radians\n  csv         parameters and limits; millimetres and degrees\n  c, rust     constants for firmware; metres and radians\n  octave      MATLAB or Octave function of the tool's pose; metres and radians"
+)]
 pub(super) struct ExportArgs {
     /// robot.toml, or a built-in: puma560, puma560-optimised, irb120, ur5e, stanford, scara
     #[arg(long)]
     robot: String,
-    /// What to write it as
-    #[arg(long, value_enum)]
+    /// What to write it as: urdf, ros2, dh, mdh, json, yaml, csv, c, rust, octave
+    #[arg(long, value_enum, hide_possible_values = true)]
     format: Format,
+    /// Where the joint values of a URDF are zero: `model`, offset + scale * encoder output; or `encoder`, scale * encoder output, with
+    /// the offsets in the origins [default: model]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "WHERE")]
+    joint_zero: Option<JointZero>,
     /// File to write; printed when not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -29,9 +38,15 @@ pub(super) struct ExportArgs {
     output: OutputArgs,
 }
 
+#[derive(Debug, Error, Diagnostic)]
+#[error("--joint-zero is only for formats with a URDF")]
+#[diagnostic(help("The other formats hold offset and scale: leave it out, or take --format urdf or --format ros2."))]
+struct NoUrdf;
+
 #[derive(Serialize)]
 struct ExportReport {
     robot: String,
+    format: String,
     calibrated: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<PathBuf>,
@@ -43,13 +58,26 @@ struct ExportReport {
     largest_difference_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     largest_difference_deg: Option<f64>,
+    /// Of DH tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nearly_parallel: Option<Vec<NearlyParallelReport>>,
     warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct NearlyParallelReport {
+    /// Numbers of the two joints, from 1.
+    joints: [usize; 2],
+    angle_deg: f64,
 }
 
 impl ExportArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
+        if self.joint_zero.is_some() && !matches!(self.format, Format::Urdf | Format::Ros2) {
+            return Err(NoUrdf.into());
+        }
         let robot = Robot::open(&self.robot)?;
-        let exported = export(&robot, self.format);
+        let exported = export(&robot, self.format, self.joint_zero.unwrap_or_default());
         for remark in &exported.remarks {
             warn(remark);
         }
@@ -58,16 +86,22 @@ impl ExportArgs {
         }
         let report = ExportReport {
             robot: robot.name.clone(),
+            format: self.format.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned()),
             calibrated: robot.calibration.is_some(),
             out: self.out.clone(),
             text: self.out.is_none().then_some(exported.text),
             largest_difference_mm: exported.largest_difference.map(|(off_m, _)| mm_from_m(off_m)),
             largest_difference_deg: exported.largest_difference.map(|(_, turned_rad)| turned_rad.to_degrees()),
+            nearly_parallel: exported.largest_difference.map(|_| exported.nearly_parallel.iter().map(pair).collect()),
             warnings: exported.remarks,
         };
         print(&report, self.output.json)?;
         Ok(Outcome::Good)
     }
+}
+
+fn pair(pair: &NearlyParallel) -> NearlyParallelReport {
+    NearlyParallelReport { joints: [pair.joint, pair.joint + 1], angle_deg: pair.angle_rad.to_degrees() }
 }
 
 impl Report for ExportReport {

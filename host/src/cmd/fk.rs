@@ -51,7 +51,7 @@ impl FkArgs {
         }
         let kinds = robot.chain.joint_kinds();
         let q: Vec<f64> = self.q.iter().zip(kinds).map(|(&q, &kind)| ScreenUnit::from(kind).to_si(q)).collect();
-        let wrong_count = ListError::JointValues { found: self.q.len(), expected: kinds.len() };
+        let wrong_count = ListError::JointValues { flag: "--q", found: self.q.len(), expected: kinds.len() };
         if self.q.len() != kinds.len() {
             return Err(wrong_count.into());
         }

@@ -56,7 +56,7 @@ impl HomeArgs {
         let (robot, _) = RobotOnBoard::read(&mut link)?.ok_or(HomeError::NoParameters)?;
         let kinds = robot.kinds();
         if self.q.len() != kinds.len() {
-            return Err(ListError::JointValues { found: self.q.len(), expected: kinds.len() }.into());
+            return Err(ListError::JointValues { flag: "--q", found: self.q.len(), expected: kinds.len() }.into());
         }
         let mut q = ballbar::JointVector::zero();
         for ((place, &value), &kind) in q.as_array_mut().iter_mut().zip(&self.q).zip(kinds) {

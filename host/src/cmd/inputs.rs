@@ -177,10 +177,12 @@ pub(super) enum ListError {
         /// What may be given.
         expected: &'static str,
     },
-    /// `--q` with more or fewer values than joints.
-    #[error("--q has {found} values, but the robot has {expected} joints")]
-    #[diagnostic(help("Give one value a joint, in degrees, or millimetres for a prismatic joint: --q 10,20,…"))]
+    /// Joint values, more or fewer than joints.
+    #[error("{flag} has {found} values, but the robot has {expected} joints")]
+    #[diagnostic(help("Give one value a joint, in degrees, or millimetres for a prismatic joint: {flag} 10,20,…"))]
     JointValues {
+        /// The flag.
+        flag: &'static str,
         /// Values given.
         found: usize,
         /// Joints of the robot.

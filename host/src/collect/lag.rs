@@ -65,7 +65,7 @@ pub fn remove_lag(session: &Path, robot: &Robot, rig: &Rig) -> Result<Option<Lag
     }
     let dataset = match Dataset::read([path.as_path()], robot, rig) {
         Ok(dataset) => dataset,
-        Err(error) if matches!(error.problem(), Problem::NoPoses) => return Ok(None),
+        Err(error) if matches!(error.problem(), Problem::NoRows(_)) => return Ok(None),
         Err(error) => return Err(error.into()),
     };
     // Poses that no fit can be made of cannot tell a lag either.

@@ -4,10 +4,8 @@ use std::fmt::Write;
 
 use ballbar::JointKind;
 
-use super::origin;
+use super::{model_lines, origin};
 use crate::files::Robot;
-
-const MODEL: &str = "link: Trans(x, y, z) Rz(alpha) Ry(beta) Rx(gamma); joint: Rz or Trans_z of offset + scale * encoder output";
 
 /// Six numbers a link: x, y, z, alpha, beta, gamma.
 fn links(robot: &Robot) -> Vec<[f64; 6]> {
@@ -30,34 +28,42 @@ fn commas(numbers: &[f64]) -> String {
 }
 
 pub(super) fn c_header(robot: &Robot) -> String {
-    let mut text = format!("/* {} */\n/* {MODEL}. Metres and radians. */\n", origin(robot));
+    let mut text = format!("/* {}\n   Metres and radians.\n{} */\n", origin(robot), model_lines("   ").trim_end());
     text += "#ifndef ROBOT_KINEMATICS_H\n#define ROBOT_KINEMATICS_H\n\n";
     let count = robot.chain.joints();
     let _ = writeln!(text, "#define ROBOT_JOINTS {count}\n");
-    text += "/* x, y, z, alpha, beta, gamma */\nstatic const double ROBOT_LINKS[ROBOT_JOINTS + 1][6] = {\n";
+    text += "/* float where the processor has no double */\n#ifndef ROBOT_REAL\n#define ROBOT_REAL double\n#endif\n\n";
+    text += "/* x, y, z, alpha, beta, gamma of each link */\nstatic const ROBOT_REAL ROBOT_LINKS[ROBOT_JOINTS + 1][6] = {\n";
     for link in links(robot) {
         let _ = writeln!(text, "    {{{}}},", commas(&link));
     }
     text += "};\n\n/* 1 where the joint slides, 0 where it turns */\nstatic const int ROBOT_IS_PRISMATIC[ROBOT_JOINTS] = {";
     text += &joints(robot).iter().map(|joint| u8::from(joint.0).to_string()).collect::<Vec<_>>().join(", ");
-    text += "};\n\n/* offset, scale */\nstatic const double ROBOT_ENCODERS[ROBOT_JOINTS][2] = {\n";
+    text += "};\n\n/* offset, scale of each joint */\nstatic const ROBOT_REAL ROBOT_ENCODERS[ROBOT_JOINTS][2] = {\n";
     for (_, offset, scale) in joints(robot) {
         let _ = writeln!(text, "    {{{}}},", commas(&[offset, scale]));
     }
     text + "};\n\n#endif\n"
 }
 
+/// What looks like a well-known number is a parameter of the robot.
+const PRECISE: &str = "#[allow(clippy::approx_constant, clippy::excessive_precision, clippy::unreadable_literal)]";
+
 pub(super) fn rust_constants(robot: &Robot) -> String {
-    let mut text = format!("// {}\n// {MODEL}. Metres and radians.\n\n", origin(robot));
+    let mut text = format!("// {}\n// Metres and radians.\n{}\n", origin(robot), model_lines("// "));
     let count = robot.chain.joints();
-    let _ = writeln!(text, "/// x, y, z, alpha, beta, gamma of each link.\npub const LINKS: [[f64; 6]; {}] = [", count + 1);
+    let _ = writeln!(
+        text,
+        "/// x, y, z, alpha, beta, gamma of each link.\n{PRECISE}\npub const LINKS: [[f64; 6]; {}] = [",
+        count + 1
+    );
     for link in links(robot) {
         let _ = writeln!(text, "    [{}],", commas(&link));
     }
     text += "];\n\n/// Whether a joint slides rather than turns.\n";
     let slides = joints(robot).iter().map(|joint| joint.0.to_string()).collect::<Vec<_>>().join(", ");
     let _ = writeln!(text, "pub const IS_PRISMATIC: [bool; {count}] = [{slides}];\n");
-    let _ = writeln!(text, "/// Offset and scale of each joint.\npub const ENCODERS: [[f64; 2]; {count}] = [");
+    let _ = writeln!(text, "/// Offset and scale of each joint.\n{PRECISE}\npub const ENCODERS: [[f64; 2]; {count}] = [");
     for (_, offset, scale) in joints(robot) {
         let _ = writeln!(text, "    [{}],", commas(&[offset, scale]));
     }
@@ -68,8 +74,9 @@ pub(super) fn octave_function(robot: &Robot) -> String {
     let mut text = String::from("function T = robot_pose(q)\n");
     let _ = writeln!(
         text,
-        "% {}\n% {MODEL}.\n% Pose of the tool in the base frame, 4 by 4, at encoder outputs q; metres and radians.",
-        origin(robot)
+        "% Pose of the tool in the base frame, 4 by 4, at encoder outputs q; metres and radians.\n% {}\n{}",
+        origin(robot),
+        model_lines("% ").trim_end()
     );
     text += "links = [\n";
     for link in links(robot) {

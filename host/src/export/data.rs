@@ -5,7 +5,7 @@ use std::fmt::Write;
 use ballbar::{JointKind, Parameter};
 use serde::Serialize;
 
-use super::origin;
+use super::{MODEL, model_lines, origin};
 use crate::files::Robot;
 use crate::units::ScreenUnit;
 
@@ -39,9 +39,6 @@ struct JointData {
     max: f64,
 }
 
-const MODEL: &str = "link = Trans(x, y, z) Rz(alpha) Ry(beta) Rx(gamma); joint = Rz or Trans_z of offset + scale * encoder output; \
-                     tool in base = link 1, joint 1, ... joint J, link J+1";
-
 impl<'a> RobotData<'a> {
     fn new(robot: &'a Robot) -> Self {
         let chain = &robot.chain;
@@ -74,7 +71,7 @@ pub(super) fn json(robot: &Robot) -> String {
     serde_json::to_string_pretty(&RobotData::new(robot)).unwrap_or_default() + "\n"
 }
 
-/// YAML in blocks. Texts are quoted as in JSON, which YAML reads alike.
+/// YAML in blocks.
 pub(super) fn yaml(robot: &Robot) -> String {
     let data = RobotData::new(robot);
     let mut text = format!("name: {}\n", quoted(data.name));
@@ -101,16 +98,29 @@ fn yaml_number(value: f64) -> String {
     if text.contains('.') { text } else { text.replacen('e', ".0e", 1) }
 }
 
+/// A text in double quotes. YAML takes fewer characters as they are than JSON does, and more of them as ends of a line.
 fn quoted(text: &str) -> String {
-    serde_json::to_string(text).unwrap_or_default()
+    let escaped = text.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if c == ' ' || c.is_ascii_graphic() || c.is_alphanumeric() => c.to_string(),
+        c => format!("\\U{:08x}", u32::from(c)),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
 }
 
+/// Parameters, and the limits of each joint's encoder output.
 pub(super) fn csv(robot: &Robot) -> String {
-    let mut text = format!("# {}\n# {MODEL}\nparameter,unit,value\n", origin(robot));
+    let mut text = format!("# {}\n{}parameter,unit,value\n", origin(robot), model_lines("# "));
     for (i, &value) in robot.chain.parameters().iter().enumerate() {
         let parameter = Parameter::from_index(i);
         let unit = ScreenUnit::from(robot.chain.unit(parameter));
         let _ = writeln!(text, "{parameter},{},{:?}", unit.name(), unit.from_si(value));
+    }
+    for (i, (limits, &kind)) in robot.limits.iter().zip(robot.chain.joint_kinds()).enumerate() {
+        let unit = ScreenUnit::from(kind);
+        for (name, value) in [("min", limits.min), ("max", limits.max)] {
+            let _ = writeln!(text, "{name}{},{},{:?}", i + 1, unit.name(), unit.from_si(value));
+        }
     }
     text
 }

@@ -2,16 +2,16 @@
 
 use std::fmt::Write;
 
-use ballbar::{JointKind, Pose};
+use ballbar::{JointKind, Pose, Vector3};
 
 use super::{Exported, origin};
 use crate::files::Robot;
-use crate::kinematics::{Convention, DhTable, link_angles};
-use crate::units::mm_from_m;
+use crate::kinematics::{Convention, DhRow, DhTable, from_link, link_angles};
+use crate::units::{ScreenUnit, m_from_mm, mm_from_m, without_noise};
 
 /// The table, how far it is from the robot, and where and why its values run away.
 pub(super) fn exported(robot: &Robot, convention: Convention) -> Exported {
-    let table = DhTable::new(&robot.chain, convention);
+    let table = as_written(DhTable::new(&robot.chain, convention));
     let difference = table.largest_difference(&robot.chain, &robot.limits);
     let remarks = table.nearly_parallel.iter().map(|pair| {
         let (first, second) = (pair.joint, pair.joint + 1);
@@ -23,10 +23,33 @@ pub(super) fn exported(robot: &Robot, convention: Convention) -> Exported {
             mm_from_m(largest_m)
         )
     });
-    Exported { text: text(robot, &table, difference), remarks: remarks.collect(), largest_difference: Some(difference) }
+    let remarks: Vec<String> = remarks.collect();
+    let text = text(robot, &table, difference, &remarks);
+    Exported { text, remarks, largest_difference: Some(difference), nearly_parallel: table.nearly_parallel }
 }
 
-fn text(robot: &Robot, table: &DhTable, (off_m, turned_rad): (f64, f64)) -> String {
+/// What a reader of the text gets: the difference to the robot is that of the file.
+fn as_written(mut table: DhTable) -> DhTable {
+    let by = |unit: ScreenUnit, value: f64| unit.to_si(without_noise(unit.from_si(value)));
+    let (mm, deg) = (|m: f64| by(ScreenUnit::Millimetre, m), |rad: f64| by(ScreenUnit::Degree, rad));
+    for row in &mut table.rows {
+        let (theta_rad, alpha_rad) = (deg(row.theta_rad), deg(row.alpha_rad));
+        *row = DhRow { theta_rad, alpha_rad, d_m: mm(row.d_m), a_m: mm(row.a_m), ..*row };
+    }
+    for pose in [&mut table.base_from_first, &mut table.last_from_tool] {
+        let (translation_mm, angles_deg) = screen(pose);
+        *pose = from_link(Vector3::from(translation_mm).map(m_from_mm), angles_deg.map(f64::to_radians));
+    }
+    table
+}
+
+/// Translation in millimetres, and alpha, beta, gamma in degrees.
+fn screen(pose: &Pose<f64>) -> ([f64; 3], [f64; 3]) {
+    let translation_mm = pose.translation_m.map(|m| without_noise(mm_from_m(m)));
+    (translation_mm.into(), link_angles(&pose.rotation).map(|angle| without_noise(angle.to_degrees())))
+}
+
+fn text(robot: &Robot, table: &DhTable, (off_m, turned_rad): (f64, f64), remarks: &[String]) -> String {
     let (rows_are, columns) = match table.convention {
         Convention::Standard => {
             ("Rz(theta) Trans_z(d) Trans_x(a) Rx(alpha), a and alpha of the same row", "theta_deg,d_mm,a_mm,alpha_deg")
@@ -40,6 +63,7 @@ fn text(robot: &Robot, table: &DhTable, (off_m, turned_rad): (f64, f64)) -> Stri
     text += "# scale * encoder output is added to theta (revolute) or d (prismatic).\n";
     let (off_mm, turned_deg) = (mm_from_m(off_m), turned_rad.to_degrees());
     let _ = writeln!(text, "# Largest difference to the robot over random joint vectors: {off_mm:.1e} mm, {turned_deg:.1e} deg.");
+    remarks.iter().for_each(|remark| text += &format!("# Note: {remark}.\n"));
     text += &transform_line("base", &table.base_from_first);
     text += &transform_line("tool", &table.last_from_tool);
     let _ = writeln!(text, "joint,type,{columns},scale");
@@ -48,8 +72,8 @@ fn text(robot: &Robot, table: &DhTable, (off_m, turned_rad): (f64, f64)) -> Stri
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
         };
-        let (theta, d, a, alpha) =
-            (row.theta_rad.to_degrees(), mm_from_m(row.d_m), mm_from_m(row.a_m), row.alpha_rad.to_degrees());
+        let [theta, alpha] = [row.theta_rad, row.alpha_rad].map(|angle| without_noise(angle.to_degrees()));
+        let [d, a] = [row.d_m, row.a_m].map(|m| without_noise(mm_from_m(m)));
         let [first, second, third, fourth] = match table.convention {
             Convention::Standard => [theta, d, a, alpha],
             Convention::Modified => [alpha, a, theta, d],
@@ -60,7 +84,6 @@ fn text(robot: &Robot, table: &DhTable, (off_m, turned_rad): (f64, f64)) -> Stri
 }
 
 fn transform_line(name: &str, pose: &Pose<f64>) -> String {
-    let [x, y, z]: [f64; 3] = pose.translation_m.map(mm_from_m).into();
-    let [alpha, beta, gamma] = link_angles(&pose.rotation).map(f64::to_degrees);
+    let ([x, y, z], [alpha, beta, gamma]) = screen(pose);
     format!("# {name}: Trans({x:?}, {y:?}, {z:?}) mm * Rz({alpha:?}) Ry({beta:?}) Rx({gamma:?}) deg\n")
 }

@@ -6,7 +6,7 @@ mod dh;
 mod urdf;
 
 use crate::files::Robot;
-use crate::kinematics::Convention;
+use crate::kinematics::{Convention, NearlyParallel};
 
 /// What to write a robot as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -33,6 +33,20 @@ pub enum Format {
     Octave,
 }
 
+/// Where the joint values of a URDF are zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum JointZero {
+    /// Joint value = offset + scale * encoder output: links are as in the robot file
+    #[default]
+    Model,
+    /// Joint value = scale * encoder output: offsets are in the origins
+    Encoder,
+}
+
+/// What every format says of its numbers.
+const MODEL: &str = "tool in base = link 1, joint 1, ... joint J, link J+1; link = Trans(x, y, z) Rz(alpha) Ry(beta) Rx(gamma); \
+                     joint = Rz (revolute) or Trans_z (prismatic) of offset + scale * encoder output";
+
 /// A robot's text, and what its reader should know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exported {
@@ -42,14 +56,16 @@ pub struct Exported {
     pub remarks: Vec<String>,
     /// Of a format with another model: the largest differences to the robot over random joint vectors, metres and radians.
     pub largest_difference: Option<(f64, f64)>,
+    /// Of a DH table: axes whose common normal is far away.
+    pub nearly_parallel: Vec<NearlyParallel>,
 }
 
-/// Writes a robot in a format.
-pub fn export(robot: &Robot, format: Format) -> Exported {
-    let exact = |text| Exported { text, remarks: Vec::new(), largest_difference: None };
+/// Writes a robot in a format; `zero` is for those that hold a URDF.
+pub fn export(robot: &Robot, format: Format, zero: JointZero) -> Exported {
+    let exact = |text| Exported { text, remarks: Vec::new(), largest_difference: None, nearly_parallel: Vec::new() };
     match format {
-        Format::Urdf => Exported { text: urdf::text(robot), remarks: urdf::remarks(robot), largest_difference: None },
-        Format::Ros2 => Exported { text: urdf::ros2_parameters(robot), remarks: urdf::remarks(robot), largest_difference: None },
+        Format::Urdf => Exported { remarks: urdf::remarks(robot, zero), ..exact(urdf::text(robot, zero)) },
+        Format::Ros2 => Exported { remarks: urdf::remarks(robot, zero), ..exact(urdf::ros2_parameters(robot, zero)) },
         Format::Dh => dh::exported(robot, Convention::Standard),
         Format::Mdh => dh::exported(robot, Convention::Modified),
         Format::Json => exact(data::json(robot)),
@@ -65,6 +81,11 @@ pub fn export(robot: &Robot, format: Format) -> Exported {
 fn plain_name(robot: &Robot) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || " _-.,()".contains(c);
     robot.name.chars().take(120).map(|c| if is_plain(c) { c } else { '_' }).collect()
+}
+
+/// The model's words as lines of a comment, each behind a mark.
+fn model_lines(mark: &str) -> String {
+    MODEL.split("; ").map(|line| format!("{mark}{line}\n")).collect()
 }
 
 /// Where a robot's numbers come from, in a line for a comment.

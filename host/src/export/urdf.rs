@@ -1,17 +1,19 @@
 //! URDF: a link is an `origin` with `rpy` = gamma, beta, alpha, and its joint turns about z or slides along it.
 //!
 //! The value of a URDF joint is θ = offset + scale · q. URDF has no place for offset and scale: they stand in an element of our own
-//! within each joint, which `host-cal import` reads and others pass over.
+//! within each joint, which `host-cal import` reads and others pass over. On request an offset goes into the joint's origin instead,
+//! behind the link: `Rz(offset + scale · q) = Rz(offset) · Rz(scale · q)`, and alike for a slide.
 
 use std::fmt::Write;
 
-use ballbar::{Joint, JointKind};
+use ballbar::{Joint, JointKind, Link, Vector3};
 
-use super::origin;
+use super::{JointZero, origin};
 use crate::files::{ENCODER_ELEMENT, JointLimits, Robot};
+use crate::kinematics::{compose, from_link, link_angles};
 
 /// The robot as a URDF.
-pub(super) fn text(robot: &Robot) -> String {
+pub(super) fn text(robot: &Robot, zero: JointZero) -> String {
     let mut text = String::from("<?xml version=\"1.0\"?>\n");
     // A comment may not hold two hyphens.
     let _ = writeln!(text, "<!-- {} -->", origin(robot).replace("--", "__"));
@@ -23,7 +25,10 @@ pub(super) fn text(robot: &Robot) -> String {
     }
     for i in 0..=joints {
         let Some(link) = robot.chain.link(i) else { continue };
-        let joint = robot.chain.joint(i);
+        let (link, joint) = match (robot.chain.joint(i), zero) {
+            (Some(joint), JointZero::Encoder) => (moved(&link, &joint), Some(Joint { offset: 0.0, ..joint })),
+            (joint, _) => (link, joint),
+        };
         let (name, kind) = match joint {
             Some(Joint { kind: JointKind::Revolute, .. }) => (format!("joint_{}", i + 1), "revolute"),
             Some(Joint { kind: JointKind::Prismatic, .. }) => (format!("joint_{}", i + 1), "prismatic"),
@@ -47,35 +52,55 @@ pub(super) fn text(robot: &Robot) -> String {
 }
 
 /// A ROS 2 parameter file, for every node: the URDF as `robot_description`.
-pub(super) fn ros2_parameters(robot: &Robot) -> String {
+pub(super) fn ros2_parameters(robot: &Robot, zero: JointZero) -> String {
     let mut parameters = String::from("/**:\n  ros__parameters:\n    robot_description: |\n");
-    for line in text(robot).lines() {
+    for line in text(robot, zero).lines() {
         let _ = writeln!(parameters, "      {line}");
     }
     parameters
 }
 
 /// What a user of the URDF should know.
-pub(super) fn remarks(robot: &Robot) -> Vec<String> {
+pub(super) fn remarks(robot: &Robot, zero: JointZero) -> Vec<String> {
     let joints = (0..robot.chain.joints()).filter_map(|i| robot.chain.joint(i));
     let moved: Vec<String> = joints
         .enumerate()
-        .filter(|(_, joint)| joint.offset != 0.0 || joint.scale != 1.0)
+        .filter(|(_, joint)| (joint.offset != 0.0 && zero == JointZero::Model) || joint.scale != 1.0)
         .map(|(i, _)| format!("joint_{}", i + 1))
         .collect();
     let mut remarks =
         vec!["effort and velocity limits are not known here and stand as 0: set them before a planner reads them".to_owned()];
     if !moved.is_empty() {
+        let (holds_no, value) = match zero {
+            JointZero::Model => ("offset and scale: they are", "offset + scale * encoder output"),
+            JointZero::Encoder => ("scale: it is", "scale * encoder output"),
+        };
         remarks.push(format!(
-            "URDF holds no joint offset and scale: they are in <{ENCODER_ELEMENT}> of {}; publish offset + scale * encoder output as these \
-             joints' values",
+            "URDF holds no joint {holds_no} in <{ENCODER_ELEMENT}> of {}; publish {value} as these joints' values",
             moved.join(", ")
         ));
+    }
+    if zero == JointZero::Model && (0..robot.chain.joints()).filter_map(|i| robot.chain.joint(i)).any(|joint| joint.offset != 0.0)
+    {
+        remarks.push(
+            "with --joint-zero encoder the offsets are in the origins, and joint values begin at the encoders' zero".to_owned(),
+        );
     }
     if robot.encoders.iter().any(|facts| facts.encoder.is_some() || !facts.couplings.is_empty()) {
         remarks.push("encoder counts and couplings are not in it; keep the robot file".to_owned());
     }
     remarks
+}
+
+/// A link with its joint's offset behind it.
+fn moved(link: &Link<f64>, joint: &Joint<f64>) -> Link<f64> {
+    let offset = match joint.kind {
+        JointKind::Revolute => from_link(Vector3::zeros(), [joint.offset, 0.0, 0.0]),
+        JointKind::Prismatic => from_link(Vector3::new(0.0, 0.0, joint.offset), [0.0; 3]),
+    };
+    let pose = compose(&from_link(link.translation_m, [link.alpha_rad, link.beta_rad, link.gamma_rad]), &offset);
+    let [alpha_rad, beta_rad, gamma_rad] = link_angles(&pose.rotation);
+    Link { translation_m: pose.translation_m, alpha_rad, beta_rad, gamma_rad }
 }
 
 /// Limits of θ.
@@ -92,16 +117,18 @@ fn link_name(link: usize, joints: usize) -> String {
     }
 }
 
-/// A text as an XML attribute; what XML cannot hold becomes `_`, and what is longer than a reader takes is cut.
+/// A text as an XML attribute; what XML cannot hold becomes `_`, and what is longer than a reader takes is cut. Whatever a parser of YAML
+/// might take for the end of a line is written by its number.
 fn attribute(text: &str) -> String {
-    let text = if text.is_empty() { "robot" } else { text };
+    let text = if text.trim().is_empty() { "robot" } else { text };
     let escaped = text.chars().take(40).map(|c| match c {
         '&' => "&amp;".to_owned(),
         '<' => "&lt;".to_owned(),
         '>' => "&gt;".to_owned(),
         '"' => "&quot;".to_owned(),
         c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => "_".to_owned(),
-        c => c.to_string(),
+        c if c.is_ascii() || c.is_alphanumeric() => c.to_string(),
+        c => format!("&#x{:x};", u32::from(c)),
     });
     escaped.collect()
 }

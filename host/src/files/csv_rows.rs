@@ -18,34 +18,39 @@ use crate::units::ScreenUnit;
 pub(super) struct CsvRows<'a> {
     pub(super) source: &'a Source,
     pub(super) robot: &'a Robot,
-    pub(super) rig: &'a Rig,
     header: StringRecord,
     records: Vec<StringRecord>,
-    /// What a header may have, for messages.
-    expected_header: &'static str,
+    expected: &'a Expected<'a>,
+}
+
+/// What a kind of file has in its header, beside the robot's joints.
+pub(super) struct Expected<'a> {
+    /// What a row is, for messages: `poses`.
+    pub(super) rows_are: &'static str,
+    /// Columns that must be there.
+    pub(super) required: &'a [&'a str],
+    /// Columns that may be there.
+    pub(super) optional: &'a [&'a str],
+    /// Whether the joints may all be left out.
+    pub(super) joints_are_optional: bool,
+    /// The header in words, for messages.
+    pub(super) header: &'static str,
 }
 
 impl<'a> CsvRows<'a> {
-    /// Splits the text into records and checks the header: the robot's joints and the `required` columns must be there, the `optional`
-    /// ones may.
-    pub(super) fn split(
-        source: &'a Source,
-        robot: &'a Robot,
-        rig: &'a Rig,
-        required: &[&str],
-        optional: &[&str],
-        expected_header: &'static str,
-    ) -> Result<Self, InputError> {
+    /// Splits the text into records and checks the header.
+    pub(super) fn split(source: &'a Source, robot: &'a Robot, expected: &'a Expected<'a>) -> Result<Self, InputError> {
         let mut reader =
             ReaderBuilder::new().comment(Some(b'#')).trim(Trim::All).flexible(true).from_reader(source.text().as_bytes());
         let broken = |error: csv::Error| InputError::of_file(source.name(), Problem::Csv(error.to_string()));
+        let nothing = || InputError::of_file(source.name(), Problem::NoRows(expected.rows_are));
         if source.text().trim().is_empty() {
-            return Err(InputError::of_file(source.name(), Problem::NoPoses));
+            return Err(nothing());
         }
         let header = reader.headers().map_err(broken)?.clone();
-        let mut rows = Self { source, robot, rig, header, records: Vec::new(), expected_header };
-        rows.check_header(&[required, optional].concat())?;
-        required.iter().try_for_each(|name| rows.required(name).map(drop))?;
+        let mut rows = Self { source, robot, header, records: Vec::new(), expected };
+        rows.check_header()?;
+        expected.required.iter().try_for_each(|name| rows.required(name).map(drop))?;
         for record in reader.records() {
             let record = record.map_err(broken)?;
             // A line of white space is as empty as an empty one.
@@ -54,10 +59,7 @@ impl<'a> CsvRows<'a> {
                 rows.records.push(record);
             }
         }
-        if rows.records.is_empty() {
-            return Err(InputError::of_file(source.name(), Problem::NoPoses));
-        }
-        Ok(rows)
+        if rows.records.is_empty() { Err(nothing()) } else { Ok(rows) }
     }
 
     /// The rows.
@@ -72,8 +74,13 @@ impl<'a> CsvRows<'a> {
 
     /// Where a column stands.
     pub(super) fn required(&self, name: &str) -> Result<usize, InputError> {
-        let missing = || Problem::MissingColumn { name: name.to_owned(), expected: self.expected_header };
+        let missing = || Problem::MissingColumn { name: name.to_owned(), expected: self.expected.header };
         self.optional(name).ok_or_else(|| self.refuse_header(missing()))
+    }
+
+    /// Whether the header has any column of a joint.
+    pub(super) fn has_joints(&self) -> bool {
+        self.header.iter().any(|name| parse_joint_column(name).is_some())
     }
 
     /// Where the joints' columns stand.
@@ -82,10 +89,10 @@ impl<'a> CsvRows<'a> {
     }
 
     /// The chuck and the sphere that a row names.
-    pub(super) fn pairing(&self, record: &StringRecord, chuck: usize, sphere: usize) -> Result<PairingId, InputError> {
+    pub(super) fn pairing(&self, record: &StringRecord, rig: &Rig, chuck: usize, sphere: usize) -> Result<PairingId, InputError> {
         Ok(PairingId {
-            chuck: self.end(record, chuck, "chuck", Rig::chuck, &self.rig.chucks)?,
-            sphere: self.end(record, sphere, "sphere", Rig::sphere, &self.rig.spheres)?,
+            chuck: self.end(record, chuck, "chuck", rig.chuck(&record[chuck]), &rig.chucks)?,
+            sphere: self.end(record, sphere, "sphere", rig.sphere(&record[sphere]), &rig.spheres)?,
         })
     }
 
@@ -129,16 +136,17 @@ impl<'a> CsvRows<'a> {
         self.refuse_row(&self.header, problem)
     }
 
-    fn check_header(&self, others: &[&str]) -> Result<(), InputError> {
+    fn check_header(&self) -> Result<(), InputError> {
         for (i, name) in self.header.iter().enumerate() {
             if self.header.iter().take(i).any(|other| other == name) {
                 return Err(self.refuse_header(Problem::Duplicate { what: "column", name: name.to_owned() }));
             }
         }
         self.check_joint_columns().map_err(|problem| self.refuse_header(problem))?;
+        let others = [self.expected.required, self.expected.optional].concat();
         let is_known = |name: &str| others.contains(&name) || self.joint_columns().any(|joint| joint == name);
         if let Some(name) = self.header.iter().find(|name| !is_known(name)) {
-            let problem = Problem::UnknownColumn { name: name.to_owned(), expected: self.expected_header };
+            let problem = Problem::UnknownColumn { name: name.to_owned(), expected: self.expected.header };
             return Err(self.refuse_header(problem));
         }
         Ok(())
@@ -165,10 +173,10 @@ impl<'a> CsvRows<'a> {
                 return Err(Problem::ColumnUnit { found: name.to_owned(), expected, joint: number, kind: kind_name });
             }
         }
-        if found == kinds.len() {
+        if found == kinds.len() || found == 0 && self.expected.joints_are_optional {
             return Ok(());
         }
-        Err(Problem::JointColumns { found, expected: kinds.len(), header: self.expected_header })
+        Err(Problem::JointColumns { found, expected: kinds.len(), header: self.expected.header })
     }
 
     fn check_fields(&self, record: &StringRecord) -> Result<(), InputError> {
@@ -186,13 +194,12 @@ impl<'a> CsvRows<'a> {
         record: &StringRecord,
         column: usize,
         what: &'static str,
-        find: fn(&Rig, &str) -> Option<usize>,
+        index: Option<usize>,
         points: &[NamedPoint],
     ) -> Result<usize, InputError> {
-        let found = &record[column];
-        find(self.rig, found).ok_or_else(|| {
+        index.ok_or_else(|| {
             let known = points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>().join(", ");
-            self.refuse_field(record, column, Problem::UnknownEnd { what, found: found.to_owned(), known })
+            self.refuse_field(record, column, Problem::UnknownEnd { what, found: record[column].to_owned(), known })
         })
     }
 

@@ -26,6 +26,6 @@ pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{Calibration, EncoderFacts, JointLimits, NoEncoders, Robot};
 pub use solids::Solids;
 pub use source::{InputError, Source};
-pub use targets::{Target, compensated_csv, read_targets};
-pub use urdf::{ENCODER_ELEMENT, Imported, UrdfEnds, read_urdf};
+pub use targets::{Goal, Target, compensated_csv, read_targets};
+pub use urdf::{ENCODER_ELEMENT, Imported, UrdfEnds, parse_urdf, read_urdf};
 pub use write::{WriteError, check_writable, write_atomically, write_atomically_with};

@@ -3,7 +3,7 @@
 use ballbar::{JointKind, JointVector, Kinematics};
 use csv::StringRecord;
 
-use super::csv_rows::CsvRows;
+use super::csv_rows::{CsvRows, Expected};
 use super::numbers::Range as Of;
 use super::poses::{csv_record, joint_column};
 use super::problem::Problem;
@@ -143,7 +143,9 @@ pub fn read_plan(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PlanRo
     const HEADER: &str = "kind,chuck,sphere,bar_mm,q1_deg,…,qJ_deg,latitude_deg,longitude_deg,length_mm (qi_mm for a prismatic joint), \
                           then margins, as `host-cal plan` writes them";
     const REQUIRED: [&str; 7] = ["kind", "chuck", "sphere", "bar_mm", "latitude_deg", "longitude_deg", "length_mm"];
-    let rows = CsvRows::split(source, robot, rig, &REQUIRED, &MARGINS, HEADER)?;
+    const EXPECTED: Expected<'_> =
+        Expected { rows_are: "poses", required: &REQUIRED, optional: &MARGINS, joints_are_optional: false, header: HEADER };
+    let rows = CsvRows::split(source, robot, &EXPECTED)?;
     let columns = Columns {
         kind: rows.required("kind")?,
         chuck: rows.required("chuck")?,
@@ -155,11 +157,12 @@ pub fn read_plan(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PlanRo
         length: rows.required("length_mm")?,
     };
     let kinematics = Kinematics::new(&robot.chain);
-    rows.records().iter().map(|record| read_row(&rows, &columns, &kinematics, record)).collect()
+    rows.records().iter().map(|record| read_row(&rows, rig, &columns, &kinematics, record)).collect()
 }
 
 fn read_row(
     rows: &CsvRows<'_>,
+    rig: &Rig,
     columns: &Columns,
     kinematics: &Kinematics<f64>,
     record: &StringRecord,
@@ -172,7 +175,7 @@ fn read_row(
             return Err(rows.refuse_field(record, columns.kind, problem));
         }
     };
-    let pairing = rows.pairing(record, columns.chuck, columns.sphere)?;
+    let pairing = rows.pairing(record, rig, columns.chuck, columns.sphere)?;
     let q = rows.joint_vector(record, &columns.q)?;
     let is_attached = kind == RowKind::Measure || !record[columns.length].is_empty();
     let bar = if is_attached {
@@ -187,7 +190,7 @@ fn read_row(
     };
     /// Lengths are written to the nanometre, from joints to the nanodegree.
     const SAME_M: f64 = 1e-6;
-    let length_m = kinematics.length(&q, &rows.rig.pairing(pairing));
+    let length_m = kinematics.length(&q, &rig.pairing(pairing));
     if let Some(planned) = bar.filter(|planned| (planned.length_m - length_m).abs() > SAME_M) {
         let problem = Problem::PlanOfAnother { planned_mm: mm_from_m(planned.length_m), length_mm: mm_from_m(length_m) };
         return Err(rows.refuse_field(record, columns.length, problem));

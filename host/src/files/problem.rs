@@ -181,8 +181,8 @@ pub enum Problem {
     #[error("a quote that is opened on this line is not closed on it")]
     OpenQuote,
     /// A header and nothing else.
-    #[error("no poses")]
-    NoPoses,
+    #[error("no {0}")]
+    NoRows(&'static str),
     /// CSV that cannot be split into records.
     #[error("not CSV: {0}")]
     Csv(String),
@@ -208,6 +208,9 @@ pub enum Problem {
     /// Not XML, or XML with a document type, in the parser's words.
     #[error("not XML that can be read: {0}")]
     Xml(String),
+    /// A robot description that is yet to be expanded.
+    #[error("this is xacro, a program that makes a URDF, and no URDF yet")]
+    Xacro,
     /// An element or attribute of a robot description that is missing or cannot be what it is.
     #[error("{what} is {found}, expected {expected}")]
     Urdf {
@@ -277,14 +280,18 @@ impl Problem {
             | Self::UnknownColumn { expected, .. }
             | Self::JointColumns { header: expected, .. } => return Some(format!("Expected: {expected}.")),
             Self::UnknownEnd { .. } => "Names are compared letter by letter; is this the rig that was measured with?",
-            Self::NoPoses => "Was the recording stopped before the first pose settled?",
+            Self::NoRows("targets") => "Write a target a line below the header.",
+            Self::NoRows(_) => "Was the recording stopped before the first pose settled?",
             Self::Word { .. } => return None,
             Self::TooLong { .. } => "Robot descriptions are far shorter; is it the right file?",
             Self::Xml(_) => {
                 "A URDF file is needed, without DOCTYPE and entities; expand a xacro file first: xacro robot.xacro > robot.urdf"
             }
+            Self::Xacro => "Expand it first: xacro robot.xacro > robot.urdf",
             Self::Urdf { .. } => "See the URDF specification: a joint has a parent, a child, origin, axis and limit.",
-            Self::UrdfTree(_) => "The links and joints of a URDF are a tree: one root, and one joint above every other link.",
+            Self::UrdfTree(_) => {
+                "The links and joints of a URDF are a tree: one root, and one joint above every other link. `--base` is nearer to the root."
+            }
             Self::UrdfLink { known, .. } => return Some(format!("Links: {known}.")),
             Self::UrdfEnds { known } => return Some(format!("Name it: --tip LINK. Ends: {known}.")),
             Self::PlanOfAnother { .. } => {

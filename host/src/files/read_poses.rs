@@ -5,7 +5,7 @@ use std::path::Path;
 use ballbar::Measurement;
 use csv::StringRecord;
 
-use super::csv_rows::CsvRows;
+use super::csv_rows::{CsvRows, Expected};
 use super::numbers::Range as Of;
 use super::poses::{Dataset, Motion, PoseRow};
 use super::problem::Problem;
@@ -89,7 +89,9 @@ fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<V
     const OPTIONAL: [&str; 7] = ["sigma_mm", "set", "t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
     const HEADER: &str = "chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); \
                           optional: sigma_mm, set, t_s, bar_mm, plan_row, rate_mm_s, lag_ms";
-    let rows = CsvRows::split(source, robot, rig, &REQUIRED, &OPTIONAL, HEADER)?;
+    const EXPECTED: Expected<'_> =
+        Expected { rows_are: "poses", required: &REQUIRED, optional: &OPTIONAL, joints_are_optional: false, header: HEADER };
+    let rows = CsvRows::split(source, robot, &EXPECTED)?;
     let columns = Columns {
         chuck: rows.required("chuck")?,
         sphere: rows.required("sphere")?,
@@ -101,11 +103,11 @@ fn read_rows(source: &Source, robot: &Robot, rig: &Rig, file: usize) -> Result<V
         bar: rows.optional("bar_mm"),
         motion: rows.optional("rate_mm_s").zip(rows.optional("lag_ms")),
     };
-    rows.records().iter().map(|record| read_row(&rows, &columns, record, file)).collect()
+    rows.records().iter().map(|record| read_row(&rows, rig, &columns, record, file)).collect()
 }
 
-fn read_row(rows: &CsvRows<'_>, columns: &Columns, record: &StringRecord, file: usize) -> Result<PoseRow, InputError> {
-    let pairing = rows.pairing(record, columns.chuck, columns.sphere)?;
+fn read_row(rows: &CsvRows<'_>, rig: &Rig, columns: &Columns, record: &StringRecord, file: usize) -> Result<PoseRow, InputError> {
+    let pairing = rows.pairing(record, rig, columns.chuck, columns.sphere)?;
     let q = rows.joint_vector(record, &columns.q)?;
     let length_m = m_from_mm(rows.number(record, columns.length, Of::Positive)?);
     let sigma = columns.sigma.map(|column| rows.number(record, column, Of::Deviation));
@@ -113,7 +115,7 @@ fn read_row(rows: &CsvRows<'_>, columns: &Columns, record: &StringRecord, file: 
     let bar = columns.bar.map(|column| rows.number(record, column, Of::Positive));
     Ok(PoseRow {
         pairing,
-        measurement: Measurement { pairing: rows.rig.pairing(pairing), q, length_m, weight: 1.0 },
+        measurement: Measurement { pairing: rig.pairing(pairing), q, length_m, weight: 1.0 },
         sigma_m: sigma.transpose()?.map(m_from_mm),
         set: columns.set.map(|column| record[column].to_owned()),
         t_s: t_s.transpose()?,

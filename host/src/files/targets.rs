@@ -1,60 +1,74 @@
-//! `targets.csv`: where a tool is to go, as joint vectors of a controller, with or without a pose beside them.
+//! `targets.csv`: where a tool is to go, as joint vectors of a controller, as poses, or as both.
 
 use ballbar::{JointVector, Pose, Vector3};
 
-use super::csv_rows::CsvRows;
+use super::csv_rows::{CsvRows, Expected};
 use super::numbers::Range as Of;
 use super::poses::{csv_record, joint_column};
-use super::rig::Rig;
 use super::robot::Robot;
-use super::solids::Solids;
 use super::source::{InputError, Source};
 use crate::kinematics::{Compensation, from_link, link_angles};
-use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
+use crate::units::{ScreenUnit, fixed, m_from_mm, mm_from_m};
 
 /// A row of a file of targets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
-    /// Joints that the controller would go to, radians or metres.
-    pub q: JointVector<f64>,
-    /// Pose of the tool in the base frame, where the file gives one.
-    pub base_from_tool: Option<Pose<f64>>,
+    /// Where the tool is to go.
+    pub goal: Goal,
     /// Line in the file, from 1.
     pub line: usize,
 }
 
+/// How a target is given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// The pose that the controller's model has at these joints, radians or metres.
+    Joints(JointVector<f64>),
+    /// A pose of the tool in the base frame, and joints near which the controller's own solution is, where they are given.
+    Pose(Pose<f64>, Option<JointVector<f64>>),
+}
+
 const POSE: [&str; 6] = ["x_mm", "y_mm", "z_mm", "alpha_deg", "beta_deg", "gamma_deg"];
 
-/// Reads a file of targets: the robot's joint columns, and for poses all six of `x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg`.
+/// Reads a file of targets: the robot's joint columns, or all six of `x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg`, or both.
 ///
 /// # Errors
 /// [`InputError`] naming the line and the column that is wrong.
 pub fn read_targets(source: &Source, robot: &Robot) -> Result<Vec<Target>, InputError> {
-    const HEADER: &str =
-        "q1_deg,…,qJ_deg (qi_mm for a prismatic joint), and for poses x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg";
-    // Targets have to do with no chuck and no sphere.
-    let rig = Rig { chucks: Vec::new(), spheres: Vec::new(), bar: None, solids: Solids::default() };
-    let rows = CsvRows::split(source, robot, &rig, &[], &POSE, HEADER)?;
-    let joints = rows.joints()?;
+    const EXPECTED: Expected<'_> = Expected {
+        rows_are: "targets",
+        required: &[],
+        optional: &POSE,
+        joints_are_optional: true,
+        header: "q1_deg,…,qJ_deg (qi_mm for a prismatic joint), or x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg, or both",
+    };
+    let rows = CsvRows::split(source, robot, &EXPECTED)?;
     let has_pose = POSE.iter().any(|name| rows.optional(name).is_some());
-    let pose_columns =
-        if has_pose { POSE.iter().map(|name| rows.required(name)).collect::<Result<Vec<_>, _>>()? } else { Vec::new() };
+    let pose = if has_pose { POSE.iter().map(|name| rows.required(name)).collect::<Result<Vec<_>, _>>()? } else { Vec::new() };
+    // Of a header with neither, the joints are what is missed.
+    let joints = if rows.has_joints() || !has_pose { rows.joints()? } else { Vec::new() };
     let mut targets = Vec::new();
     for record in rows.records() {
         let numbers: Vec<f64> =
-            pose_columns.iter().map(|&column| rows.number(record, column, Of::Plausible)).collect::<Result<_, _>>()?;
+            pose.iter().map(|&column| rows.number(record, column, Of::Plausible)).collect::<Result<_, _>>()?;
         let base_from_tool = match numbers[..] {
             [x, y, z, alpha, beta, gamma] => {
                 Some(from_link(Vector3::new(x, y, z).map(m_from_mm), [alpha, beta, gamma].map(f64::to_radians)))
             }
             _ => None,
         };
-        targets.push(Target { q: rows.joint_vector(record, &joints)?, base_from_tool, line: rows.line(record) });
+        let goal = match base_from_tool {
+            None => Goal::Joints(rows.joint_vector(record, &joints)?),
+            Some(pose) if joints.is_empty() => Goal::Pose(pose, None),
+            Some(pose) => Goal::Pose(pose, Some(rows.joint_vector(record, &joints)?)),
+        };
+        targets.push(Target { goal, line: rows.line(record) });
     }
     Ok(targets)
 }
 
-/// Commands as a file: joints to command, the pose that the controller believes to reach by them, and the predicted errors.
+/// Commands as a file: the target's line, joints to command, the pose that the controller believes to reach by them, and the
+/// predicted errors.
 pub fn compensated_csv(robot: &Robot, commands: &[(usize, Compensation)]) -> String {
     const ERRORS: [&str; 4] = ["before_mm", "before_deg", "left_mm", "left_deg"];
     let kinds = robot.chain.joint_kinds();
@@ -65,12 +79,12 @@ pub fn compensated_csv(robot: &Robot, commands: &[(usize, Compensation)]) -> Str
     for (line, found) in commands {
         let pose = &found.nominal_base_from_tool;
         let mut fields = vec![line.to_string()];
-        fields
-            .extend(kinds.iter().zip(found.q.as_array()).map(|(&kind, &q)| format!("{:.9}", ScreenUnit::from(kind).from_si(q))));
-        fields.extend(pose.translation_m.iter().map(|&m| format!("{:.6}", mm_from_m(m))));
-        fields.extend(link_angles(&pose.rotation).iter().map(|angle| format!("{:.6}", angle.to_degrees())));
+        fields.extend(kinds.iter().zip(found.q.as_array()).map(|(&kind, &q)| fixed(ScreenUnit::from(kind).from_si(q), 9)));
+        fields.extend(pose.translation_m.iter().map(|&m| fixed(mm_from_m(m), 6)));
+        // A turn of a nanodegree moves what is a metre away by less than a nanometre.
+        fields.extend(link_angles(&pose.rotation).iter().map(|angle| fixed(angle.to_degrees(), 9)));
         for (off_m, turned_rad) in [found.before, found.left] {
-            fields.extend([format!("{:.6}", mm_from_m(off_m)), format!("{:.6}", turned_rad.to_degrees())]);
+            fields.extend([fixed(mm_from_m(off_m), 6), fixed(turned_rad.to_degrees(), 6)]);
         }
         text += &(csv_record(fields.into_iter()) + "\n");
     }

@@ -75,7 +75,7 @@ impl InverseKinematics {
         let mut fruitless = 0;
         for _ in 0..effort.starts {
             fruitless += 1;
-            if let Some(q) = self.skeleton.reach_pose(&self.random_start(rng), base_from_tool) {
+            if let Some(q) = self.reach(&self.random_start(rng), base_from_tool) {
                 let q = self.unwound(&q);
                 if found.iter().all(|other| self.wrapped_distance(other, &q) > SAME) {
                     found.push(q);
@@ -87,6 +87,18 @@ impl InverseKinematics {
             }
         }
         self.sorted(found)
+    }
+
+    /// Joint vector that brings the tool to a pose, by steps from `start`; of an arm of fewer than six joints to the pose's position, and as
+    /// near to its orientation as it can. Limits are not looked at.
+    pub fn reach(&self, start: &JointVector<f64>, base_from_tool: &Pose<f64>) -> Option<JointVector<f64>> {
+        /// An arm with fewer joints cannot turn its tool freely.
+        const FREE_JOINTS: usize = 6;
+        if self.skeleton.joints() < FREE_JOINTS {
+            self.skeleton.approach_pose(start, base_from_tool)
+        } else {
+            self.skeleton.reach_pose(start, base_from_tool)
+        }
     }
 
     /// A joint vector within the limits; of joints with more than a turn, within the middle one.
@@ -116,6 +128,22 @@ impl InverseKinematics {
             if encoder.kind == JointKind::Revolute {
                 let (middle, turn) = ((limits.min + limits.max) / 2.0, TAU / encoder.scale.abs());
                 *value -= ((*value - middle) / turn).round() * turn;
+            }
+        }
+        q
+    }
+
+    /// The same posture with every revolute joint at the turn nearest to another's, as far as its limits let it.
+    pub fn turned_towards(&self, q: &JointVector<f64>, other: &JointVector<f64>) -> JointVector<f64> {
+        let mut q = *q;
+        let joints = self.limits.iter().zip(self.skeleton.encoders());
+        for ((value, other), (limits, encoder)) in q.as_array_mut().iter_mut().zip(other.as_array()).zip(joints) {
+            if encoder.kind == JointKind::Revolute {
+                let turn = TAU / encoder.scale.abs();
+                let turned = *value - ((*value - other) / turn).round() * turn;
+                if limits.contain(turned) {
+                    *value = turned;
+                }
             }
         }
         q

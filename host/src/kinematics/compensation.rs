@@ -1,16 +1,25 @@
 //! Commands for a controller that keeps its nominal model: what to tell it so that the real robot goes where it should.
 
-use ballbar::{JointVector, Kinematics, Pose};
+use std::fmt;
 
+use ballbar::{JointKind, JointVector, Kinematics, Pose};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::branches::{InverseKinematics, Thoroughness};
 use super::frames::apart;
-use super::skeleton::Skeleton;
-use crate::files::{Robot, Target};
+use crate::files::{Goal, JointLimits, Robot};
+use crate::units::{ScreenUnit, tidy};
 
 /// A calibrated robot beside the model that its controller has.
 #[derive(Clone, Debug)]
 pub struct Compensator {
-    calibrated: Skeleton,
-    nominal: Kinematics<f64>,
+    calibrated: InverseKinematics,
+    nominal: InverseKinematics,
+    nominal_forward: Kinematics<f64>,
+    kinds: Vec<JointKind>,
+    /// What both robots allow.
+    limits: Vec<JointLimits>,
 }
 
 /// What to command for one target. Differences are metres and radians, as the calibrated robot predicts them.
@@ -18,32 +27,143 @@ pub struct Compensator {
 pub struct Compensation {
     /// Joints to command, radians or metres.
     pub q: JointVector<f64>,
-    /// The pose that the controller believes to reach by them.
+    /// Joints that the controller would go to by itself.
+    pub nominal_q: JointVector<f64>,
+    /// The pose that the controller believes to reach by `q`: what to command where it takes poses.
     pub nominal_base_from_tool: Pose<f64>,
-    /// From the target, if the controller goes to the joints of the file.
+    /// From the target, if the controller goes to `nominal_q`.
     pub before: (f64, f64),
     /// From the target, if it goes to `q`.
     pub left: (f64, f64),
 }
 
+/// Why a target has no command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unreached {
+    /// The controller's own model does not get there, or only beyond limits.
+    ByNominal,
+    /// The calibrated robot does not get there.
+    ByCalibrated,
+    /// A joint would go beyond its limits.
+    Limit {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Its kind.
+        kind: JointKind,
+        /// Where it would have to go, radians or metres.
+        q: f64,
+        /// Its limits.
+        limits: JointLimits,
+    },
+}
+
+impl fmt::Display for Unreached {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::ByNominal => f.write_str("the controller's model has no joints within limits for this pose"),
+            Self::ByCalibrated => f.write_str("the calibrated robot does not reach this pose"),
+            Self::Limit { joint, kind, q, limits } => {
+                let unit = ScreenUnit::from(kind);
+                let [q, min, max] = [q, limits.min, limits.max].map(|value| tidy(unit.from_si(value)));
+                write!(f, "joint {joint} would have to go to {q:.4} {}, beyond its limits, {min} to {max}", unit.name())
+            }
+        }
+    }
+}
+
 impl Compensator {
     /// A calibrated robot and its controller's model; both have the same joints.
     pub fn new(calibrated: &Robot, nominal: &Robot) -> Self {
-        Self { calibrated: Skeleton::new(&calibrated.chain), nominal: Kinematics::new(&nominal.chain) }
+        let both = calibrated.limits.iter().zip(&nominal.limits);
+        Self {
+            calibrated: InverseKinematics::new(calibrated),
+            nominal: InverseKinematics::new(nominal),
+            nominal_forward: Kinematics::new(&nominal.chain),
+            kinds: nominal.chain.joint_kinds().to_vec(),
+            limits: both.map(|(a, b)| JointLimits { min: a.min.max(b.min), max: a.max.min(b.max) }).collect(),
+        }
     }
 
-    /// Joints by which the calibrated robot is at the target, on the branch of the target's own joints; `None` when they cannot be
-    /// brought there. The target is the pose of the row, or else the pose that the nominal model has at its joints. `rounded` is what
-    /// becomes of joints on their way to the controller.
-    pub fn compensate(&self, target: &Target, rounded: impl Fn(JointVector<f64>) -> JointVector<f64>) -> Option<Compensation> {
-        let wanted = target.base_from_tool.unwrap_or_else(|| self.nominal.base_from_tool(&target.q));
-        let q = rounded(self.calibrated.reach_pose(&target.q, &wanted)?);
-        let from_target = |q: &JointVector<f64>| apart(&wanted, &self.calibrated.at(q).base_from_tool);
-        Some(Compensation {
+    /// The middle of the joints' ranges.
+    pub fn middle(&self) -> JointVector<f64> {
+        let mut q = JointVector::zero();
+        q.as_array_mut().iter_mut().zip(&self.limits).for_each(|(q, limits)| *q = (limits.min + limits.max) / 2.0);
+        q
+    }
+
+    /// Joints by which the calibrated robot is at the target, on the branch on which the controller would go there: of the target's joints,
+    /// or of a pose the one within limits that is nearest to the joints beside it, or else to `before`, where the arm comes from. `rounded`
+    /// is what becomes of joints on their way to the controller.
+    ///
+    /// # Errors
+    /// [`Unreached`] says why the target has none.
+    pub fn compensate(
+        &self,
+        goal: &Goal,
+        before: &JointVector<f64>,
+        rounded: impl Fn(JointVector<f64>) -> JointVector<f64>,
+    ) -> Result<Compensation, Unreached> {
+        let (wanted, nominal_q) = match *goal {
+            Goal::Joints(q) => (self.nominal_forward.base_from_tool(&q), q),
+            Goal::Pose(pose, near) => (pose, self.nominal_joints(&pose, &near.unwrap_or(*before)).ok_or(Unreached::ByNominal)?),
+        };
+        let stepped = self.calibrated.reach(&nominal_q, &wanted);
+        let near = stepped.filter(|q| is_near(q, &nominal_q));
+        // What is only reached beyond limits is refused by its joint.
+        let q = near.or_else(|| nearest_branch(&self.calibrated, &wanted, &nominal_q, stepped)).or(stepped);
+        let q = rounded(q.ok_or(Unreached::ByCalibrated)?);
+        self.check_limits(&q)?;
+        let from_target = |q: &JointVector<f64>| apart(&wanted, &self.calibrated.skeleton().at(q).base_from_tool);
+        Ok(Compensation {
             q,
-            nominal_base_from_tool: self.nominal.base_from_tool(&q),
-            before: from_target(&target.q),
+            nominal_q,
+            nominal_base_from_tool: self.nominal_forward.base_from_tool(&q),
+            before: from_target(&nominal_q),
             left: from_target(&q),
         })
     }
+
+    /// Joints of the nominal model for a pose, within limits, nearest to others.
+    fn nominal_joints(&self, pose: &Pose<f64>, near: &JointVector<f64>) -> Option<JointVector<f64>> {
+        /// What the decimals of a file may turn a tool out of what an arm of few joints can do.
+        const DECIMALS_RAD: f64 = 1e-3;
+        let stepped = self.nominal.reach(near, pose);
+        let q = stepped.filter(|q| is_near(q, near) && self.check_limits(q).is_ok());
+        let q = q.or_else(|| nearest_branch(&self.nominal, pose, near, stepped))?;
+        let (_, turned_rad) = apart(pose, &self.nominal_forward.base_from_tool(&q));
+        (turned_rad < DECIMALS_RAD && self.check_limits(&q).is_ok()).then_some(q)
+    }
+
+    fn check_limits(&self, q: &JointVector<f64>) -> Result<(), Unreached> {
+        let joints = self.limits.iter().zip(&self.kinds).zip(q.as_array()).enumerate();
+        match joints.into_iter().find(|(_, ((limits, _), q))| !limits.contain(**q)) {
+            None => Ok(()),
+            Some((i, ((&limits, &kind), &q))) => Err(Unreached::Limit { joint: i + 1, kind, q, limits }),
+        }
+    }
+}
+
+/// Of all branches within limits, each joint turned as near as its limits let it, the nearest. What steps from there reach is one of them,
+/// of an arm with joints to spare often the nearest of infinitely many.
+fn nearest_branch(
+    inverse: &InverseKinematics,
+    pose: &Pose<f64>,
+    to: &JointVector<f64>,
+    stepped: Option<JointVector<f64>>,
+) -> Option<JointVector<f64>> {
+    const SEED: u64 = 1993;
+    let branches = inverse.branches(pose, Thoroughness::ALL, &mut ChaCha8Rng::seed_from_u64(SEED));
+    let turned = branches.within_limits.iter().chain(&stepped).map(|q| inverse.turned_towards(q, to));
+    turned.filter(|q| inverse.is_within_limits(q)).min_by(|a, b| distance(a, to).total_cmp(&distance(b, to)))
+}
+
+/// Whether two joint vectors are too near one another to be on different branches, but for singular postures.
+fn is_near(a: &JointVector<f64>, b: &JointVector<f64>) -> bool {
+    const NEAR: f64 = 0.2;
+    distance(a, b) < NEAR
+}
+
+/// Radians and metres taken alike.
+fn distance(a: &JointVector<f64>, b: &JointVector<f64>) -> f64 {
+    a.as_array().iter().zip(b.as_array()).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }

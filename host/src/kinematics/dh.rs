@@ -1,7 +1,8 @@
 //! Denavit-Hartenberg tables of a chain, standard and modified.
 //!
 //! Both describe the same common normals, one between each axis and the next: a_i its length, alpha_i the angle between the two axes,
-//! d_i and theta_i what lies between two normals along and about the axis that they share. They differ in where a row begins:
+//! d_i and theta_i what lies between two normals along and about the axis that they share. A normal may point either way: here as the one
+//! before it, so that most theta are small. They differ in where a row begins:
 //!
 //! - standard: row i is `Rz(theta_i) · Trans_z(d_i) · Trans_x(a_i) · Rx(alpha_i)`
 //! - modified (J. J. Craig, "Introduction to Robotics"): row i is `Rx(alpha_(i-1)) · Trans_x(a_(i-1)) · Rz(theta_i) · Trans_z(d_i)`
@@ -21,6 +22,9 @@ use crate::files::JointLimits;
 const PARALLEL_RAD: f64 = 1e-9;
 /// Below this angle, radians, a user is told why the values are large: half a degree, more than a well-built arm is off.
 const NEARLY_PARALLEL_RAD: f64 = std::f64::consts::PI / 360.0;
+
+/// Axes nearer than this, metres, are taken as meeting.
+const TOUCHING_M: f64 = 1e-9;
 
 /// Which of the two tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +82,7 @@ struct Normal {
     direction: Vector3<f64>,
     from_m: Vector3<f64>,
     to_m: Vector3<f64>,
-    /// From `from_m` to `to_m` along the direction, metres.
+    /// From `from_m` to `to_m` along the direction, metres; below zero where the direction points the other way.
     a_m: f64,
     /// From axis to next axis about the direction, radians.
     alpha_rad: f64,
@@ -100,8 +104,7 @@ impl DhTable {
                 nearly_parallel: Vec::new(),
             };
         };
-        let across = any_perpendicular(&first.direction);
-        let begin = Normal { direction: across, from_m: first.point_m, to_m: first.point_m, a_m: 0.0, alpha_rad: 0.0 };
+        let begin = begin(first);
         let normals: Vec<Normal> = axes.windows(2).scan(begin, |last, pair| Some(next(last, &pair[0], &pair[1]))).collect();
         let table = Self {
             convention,
@@ -110,42 +113,26 @@ impl DhTable {
             last_from_tool: posture.base_from_tool,
             nearly_parallel: nearly_parallel(axes),
         };
-        match convention {
-            Convention::Standard => table.with_standard_rows(axes, begin, &normals),
-            Convention::Modified => table.with_modified_rows(axes, begin, &normals),
-        }
+        table.with_rows(axes, begin, &normals).closed()
     }
 
-    fn with_standard_rows(mut self, axes: &[Axis], begin: Normal, normals: &[Normal]) -> Self {
+    fn with_rows(mut self, axes: &[Axis], begin: Normal, normals: &[Normal]) -> Self {
         let mut last = begin;
-        let tool_m = self.last_from_tool.translation_m;
         for (i, axis) in axes.iter().enumerate() {
             // Behind the last axis there is no other: its row goes on along it as far as the tool does.
-            let tool_along_m = last.to_m + axis.direction * axis.direction.dot(&(tool_m - last.to_m));
-            let end = Normal { from_m: tool_along_m, to_m: tool_along_m, a_m: 0.0, alpha_rad: 0.0, ..last };
-            let normal = normals.get(i).copied().unwrap_or(end);
-            self.rows.push(row(axis, &last, &normal, (normal.a_m, normal.alpha_rad)));
+            let normal = normals.get(i).copied().unwrap_or_else(|| end(axis, &last, &self.last_from_tool));
+            let between = match self.convention {
+                Convention::Standard => normal,
+                Convention::Modified => last,
+            };
+            self.rows.push(row(axis, &last, &normal, (between.a_m, between.alpha_rad)));
             last = normal;
         }
-        self.close()
-    }
-
-    fn with_modified_rows(mut self, axes: &[Axis], begin: Normal, normals: &[Normal]) -> Self {
-        let mut last = normals.first().copied().map_or(begin, |first| Normal { to_m: first.from_m, ..first });
-        last = Normal { a_m: 0.0, alpha_rad: 0.0, ..last };
-        if let Some(first) = axes.first() {
-            self.base_from_first = last.frame(&first.direction);
-        }
-        for (i, axis) in axes.iter().enumerate() {
-            let normal = normals.get(i).copied().unwrap_or(Normal { from_m: last.to_m, ..last });
-            self.rows.push(row(axis, &last, &normal, (last.a_m, last.alpha_rad)));
-            last = normal;
-        }
-        self.close()
+        self
     }
 
     /// Whatever the rows leave of the tool's pose at encoders zero is the last transform.
-    fn close(mut self) -> Self {
+    fn closed(mut self) -> Self {
         let base_from_tool = self.last_from_tool;
         self.last_from_tool = from_link(Vector3::zeros(), [0.0; 3]);
         self.last_from_tool = compose(&inverse(&self.base_from_tool(&[])), &base_from_tool);
@@ -200,6 +187,30 @@ impl Normal {
     }
 }
 
+/// Where the table begins on the first axis: below or above the base frame's origin, x as near to the base's as can be. So the transform
+/// before the first row is none where the first axis is the base's z.
+fn begin(first: &Axis) -> Normal {
+    let foot_m = first.point_m - first.direction * first.direction.dot(&first.point_m);
+    let x = across(&first.direction, &Vector3::x(), &Vector3::y());
+    Normal { direction: x, from_m: foot_m, to_m: foot_m, a_m: 0.0, alpha_rad: 0.0 }
+}
+
+/// Where the table ends on the last axis: beside the tool, x as near to the tool's as can be.
+fn end(axis: &Axis, last: &Normal, base_from_tool: &Pose<f64>) -> Normal {
+    let foot_m = last.to_m + axis.direction * axis.direction.dot(&(base_from_tool.translation_m - last.to_m));
+    let column = |i: usize| base_from_tool.rotation.column(i).into();
+    let x = across(&axis.direction, &column(0), &column(1));
+    Normal { direction: x, from_m: foot_m, to_m: foot_m, a_m: 0.0, alpha_rad: 0.0 }
+}
+
+/// What of a direction is across an axis; of another one where it is along it.
+fn across(axis: &Vector3<f64>, direction: &Vector3<f64>, other: &Vector3<f64>) -> Vector3<f64> {
+    /// Sine of what is along.
+    const ALONG: f64 = 0.1;
+    let part = |v: &Vector3<f64>| v - axis * axis.dot(v);
+    part(direction).try_normalize(ALONG).unwrap_or_else(|| part(other).normalize())
+}
+
 /// What lies along and about an axis between the normal that ends on it and the one that begins there.
 fn row(axis: &Axis, last: &Normal, normal: &Normal, (a_m, alpha_rad): (f64, f64)) -> DhRow {
     let z = axis.direction;
@@ -210,15 +221,13 @@ fn row(axis: &Axis, last: &Normal, normal: &Normal, (a_m, alpha_rad): (f64, f64)
 
 /// The common normal of two axes; of parallel ones the one that begins where the last ended.
 fn next(last: &mut Normal, axis: &Axis, other: &Axis) -> Normal {
-    const TOUCHING_M: f64 = 1e-9;
     let (z, w) = (axis.direction, other.direction);
     let cross = z.cross(&w);
     let (direction, from_m, to_m) = if cross.norm() > PARALLEL_RAD {
         let between_m = other.point_m - axis.point_m;
         let along = |u: &Vector3<f64>| between_m.cross(u).dot(&cross) / cross.norm_squared();
         let (from_m, to_m) = (axis.point_m + z * along(&w), other.point_m + w * along(&z));
-        let x = cross.normalize();
-        (if (to_m - from_m).dot(&x) < -TOUCHING_M { -x } else { x }, from_m, to_m)
+        (cross.normalize(), from_m, to_m)
     } else {
         let from_m = last.to_m;
         let to_m = other.point_m + w * w.dot(&(from_m - other.point_m));
@@ -226,10 +235,20 @@ fn next(last: &mut Normal, axis: &Axis, other: &Axis) -> Normal {
         let across_m = gap_m - z * z.dot(&gap_m);
         (across_m.try_normalize(TOUCHING_M).unwrap_or(last.direction), from_m, to_m)
     };
+    let direction = facing(direction, &last.direction, &(to_m - from_m));
     let a_m = (to_m - from_m).dot(&direction);
     let normal = Normal { direction, from_m, to_m, a_m, alpha_rad: cross.dot(&direction).atan2(z.dot(&w)) };
     *last = normal;
     normal
+}
+
+/// A normal's direction or its opposite: as the last normal points, so that a calibrated table is like its design's, where the two are not
+/// across one another; else towards the next axis.
+fn facing(direction: Vector3<f64>, last: &Vector3<f64>, gap_m: &Vector3<f64>) -> Vector3<f64> {
+    const ACROSS: f64 = 0.1;
+    let along = direction.dot(last);
+    let is_opposite = if along.abs() > ACROSS { along < 0.0 } else { gap_m.dot(&direction) < -TOUCHING_M };
+    if is_opposite { -direction } else { direction }
 }
 
 fn nearly_parallel(axes: &[Axis]) -> Vec<NearlyParallel> {
@@ -238,9 +257,4 @@ fn nearly_parallel(axes: &[Axis]) -> Vec<NearlyParallel> {
         NearlyParallel { joint: i + 1, angle_rad: z.cross(&w).norm().atan2(z.dot(&w).abs()) }
     });
     angles.filter(|pair| (PARALLEL_RAD..NEARLY_PARALLEL_RAD).contains(&pair.angle_rad)).collect()
-}
-
-fn any_perpendicular(z: &Vector3<f64>) -> Vector3<f64> {
-    let helper = if z.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
-    (helper - z * z.dot(&helper)).normalize()
 }

@@ -11,7 +11,7 @@ use super::Imported;
 use super::elements::{EncoderModel, Limits, Motion, UrdfRobot};
 use super::tree::Path;
 use crate::kinematics::{compose, from_link, link_angles};
-use crate::units::{ScreenUnit, mm_from_m};
+use crate::units::{ScreenUnit, mm_from_m, without_noise};
 
 /// What is known of a joint once it turns about z.
 struct ZJoint<'a> {
@@ -71,13 +71,13 @@ fn toml(name: &str, path: &Path<'_>, links: &[Pose<f64>], joints: &[ZJoint<'_>])
     let mut text =
         format!("# From a URDF, link `{}` to link `{}`.\nname = {}\n", path.base, path.tip, toml_edit::Value::from(name));
     for (i, link) in links.iter().enumerate() {
-        let [x, y, z] = link.translation_m.map(mm_from_m).into();
-        let [alpha, beta, gamma] = link_angles(&link.rotation).map(f64::to_degrees);
+        let [x, y, z] = link.translation_m.map(|m| without_noise(mm_from_m(m))).into();
+        let [alpha, beta, gamma] = link_angles(&link.rotation).map(|angle| without_noise(angle.to_degrees()));
         text +=
             &format!("\n[[links]]\ntranslation_mm = [{x:?}, {y:?}, {z:?}]\nrotation_deg = [{alpha:?}, {beta:?}, {gamma:?}]\n");
         let Some(joint) = joints.get(i) else { continue };
         let unit = ScreenUnit::from(joint.kind);
-        let [offset, min, max] = [joint.encoder.offset, joint.min, joint.max].map(|value| unit.from_si(value));
+        let [offset, min, max] = [joint.encoder.offset, joint.min, joint.max].map(|value| without_noise(unit.from_si(value)));
         let (unit, scale) = (unit.name(), joint.encoder.scale);
         let kind = match joint.kind {
             JointKind::Revolute => "revolute",

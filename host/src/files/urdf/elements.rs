@@ -71,6 +71,7 @@ pub(super) fn read<'a>(source: &Source, document: &'a Document<'a>) -> Result<Ur
         let found = format!("<{}>", short(root.tag_name().name()));
         return Err(refuse(source, root, "the outermost element", found, "<robot>"));
     }
+    check_is_expanded(source, root)?;
     let name = attribute(source, root, "name", "robot")?;
     let children = |tag: &'static str| root.children().filter(move |node| node.has_tag_name(tag));
     let mut links = Vec::new();
@@ -87,6 +88,18 @@ pub(super) fn read<'a>(source: &Source, document: &'a Document<'a>) -> Result<Ur
         joints.push(UrdfJoint { name, parent: end("parent")?, child: end("child")?, span: node.range(), node });
     }
     Ok(UrdfRobot { name, links, joints })
+}
+
+/// Refuses what is still a program: elements of xacro, or values with `${…}`.
+fn check_is_expanded(source: &Source, root: Node<'_, '_>) -> Result<(), InputError> {
+    let is_xacro = |node: &Node<'_, '_>| {
+        let is_element = node.tag_name().namespace().is_some_and(|namespace| namespace.contains("xacro"));
+        is_element || node.attributes().any(|attribute| attribute.value().contains("${"))
+    };
+    match root.descendants().find(is_xacro) {
+        None => Ok(()),
+        Some(node) => Err(InputError::at(source, opening(source, &node.range()), Problem::Xacro)),
+    }
 }
 
 impl UrdfJoint<'_> {
@@ -108,8 +121,8 @@ impl UrdfJoint<'_> {
             _ => return Err(refuse(source, self.node, &self.what("type"), format!("`{}`", short(found)), TYPES)),
         };
         if let Some(mimic) = self.child_element("mimic") {
-            let found = "there".to_owned();
-            return Err(refuse(source, mimic, &self.what("<mimic>"), found, "a joint that moves by itself"));
+            let (what, found) = (format!("joint `{}`", short(self.name)), "moved along by another joint".to_owned());
+            return Err(refuse(source, mimic, &what, found, "one that moves by itself between --base and --tip"));
         }
         let limits = if found == "continuous" { Limits::None } else { self.limits(source, kind)? };
         Ok(Motion::Moves { kind, axis: self.axis(source)?, limits })

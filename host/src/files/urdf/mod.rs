@@ -57,10 +57,14 @@ pub struct Imported {
 /// # Errors
 /// [`InputError`] naming the line and what is wrong there.
 pub fn read_urdf(path: &Path, ends: UrdfEnds<'_>) -> Result<Imported, InputError> {
-    parse(&Source::read_at_most(path, MOST_BYTES)?, ends)
+    parse_urdf(&Source::read_at_most(path, MOST_BYTES)?, ends)
 }
 
-fn parse(source: &Source, ends: UrdfEnds<'_>) -> Result<Imported, InputError> {
+/// Takes the chain between two links from the text of a URDF.
+///
+/// # Errors
+/// As [`read_urdf`].
+pub fn parse_urdf(source: &Source, ends: UrdfEnds<'_>) -> Result<Imported, InputError> {
     check_is_bounded(source)?;
     let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(source.text(), options).map_err(|error| {

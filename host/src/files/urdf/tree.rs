@@ -31,7 +31,7 @@ pub(super) fn path<'a>(source: &Source, robot: &'a UrdfRobot<'a>, ends: UrdfEnds
     // Ends, since the tree was proved to be one.
     while link != base {
         let Some(joint) = above.get(link) else {
-            let text = format!("link `{}` does not hang on link `{}`", short(tip), short(base));
+            let text = format!("no joints lead from the base, link `{}`, to the tip, link `{}`", short(base), short(tip));
             return Err(InputError::of_file(source.name(), Problem::UrdfTree(text)));
         };
         joints.push(*joint);
