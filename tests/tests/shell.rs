@@ -69,7 +69,7 @@ fn every_shell_gets_a_script_that_knows_every_command() {
 
 /// A page as a terminal shows it.
 fn formatted(path: &Path) -> String {
-    output(Command::new("groff").args(["-man", "-Tascii", "-P-cbou", "-rLL=90n"]).arg(path))
+    output(Command::new("groff").args(["-man", "-Tutf8", "-P-cbou", "-rLL=90n"]).arg(path))
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn manual_pages_of_all_commands_are_formatted_without_a_warning() {
     }
     for page in &pages {
         let path = folder.path().join("share/man1").join(page);
-        let checked = Command::new("groff").args(["-man", "-ww", "-z", "-Tascii"]).arg(&path).output().expect("groff runs");
+        let checked = Command::new("groff").args(["-man", "-ww", "-z", "-Tutf8"]).arg(&path).output().expect("groff runs");
         assert!(checked.status.success(), "{page}");
         assert_eq!(String::from_utf8_lossy(&checked.stderr), "", "{page}");
     }
