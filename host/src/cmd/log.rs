@@ -94,12 +94,13 @@ fn check(session: &Path, json: bool) -> Result<Outcome, CommandError> {
 }
 
 fn export(session: &Path, files: &ExportFiles, json: bool) -> Result<Outcome, CommandError> {
+    let log = LogReader::open(session)?.path().display().to_string();
     let exported = export_log(session, &files.named()).map_err(|error| match error {
         LogExportError::Write(error) => CommandError::output(error),
         LogExportError::Log(_) | LogExportError::SameFile { .. } => error.into(),
     })?;
     let report = ExportReport {
-        log: session.display().to_string(),
+        log,
         files,
         samples: exported.samples,
         settled: exported.settled,
