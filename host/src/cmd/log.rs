@@ -99,13 +99,8 @@ fn export(session: &Path, files: &ExportFiles, json: bool) -> Result<Outcome, Co
         LogExportError::Write(error) => CommandError::output(error),
         LogExportError::Log(_) | LogExportError::SameFile { .. } => error.into(),
     })?;
-    let report = ExportReport {
-        log,
-        files,
-        samples: exported.samples,
-        settled: exported.settled,
-        tool_poses: exported.tool_poses,
-    };
+    let report =
+        ExportReport { log, files, samples: exported.samples, settled: exported.settled, tool_poses: exported.tool_poses };
     print(&report, json)?;
     Ok(Outcome::Good)
 }
