@@ -15,6 +15,7 @@
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
 //! | [`report`] | a calibration as a page for people: facts, figures, HTML |
+//! | `platform` | what differs between operating systems |
 //! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
 //!
 //! SI units inside; millimetres and degrees in files and on screens, converted at the edge (see [`units`]).
@@ -29,6 +30,7 @@ pub mod identify;
 pub mod kinematics;
 pub mod paper;
 pub mod plan;
+mod platform;
 pub mod report;
 pub mod robot_link;
 pub mod session;

@@ -1,4 +1,4 @@
-//! Programs that read back what the command writes: Python with its libraries, Octave, a C compiler, a browser. `check` installs them.
+//! Programs that read back what the command writes: Python with its libraries, Octave, a C compiler, a browser, groff. `check` installs them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,7 +10,7 @@ const WITHOUT_READERS: &str = "BALLBAR_WITHOUT_READERS";
 pub fn is_skipped() -> bool {
     let is_skipped = std::env::var_os(WITHOUT_READERS).is_some_and(|value| value == "1");
     if is_skipped {
-        eprintln!("SKIPPED, as {WITHOUT_READERS}=1 asks for: this needs Python's libraries, octave-cli and chromium");
+        eprintln!("SKIPPED, as {WITHOUT_READERS}=1 asks for: this needs Python's libraries, octave-cli, chromium and groff");
     }
     is_skipped
 }

@@ -6,6 +6,7 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use ballbar_tests::command::{Run, host_cal_command, host_cal_in};
+use ballbar_tests::readers::{is_skipped, python};
 use host_cal::board::parameter_set;
 use host_cal::files::{Rig, Robot};
 use host_cal::robot_link::JointSpeed;
@@ -140,12 +141,24 @@ fn an_unplugged_board_is_waited_for_and_marked_as_a_gap() {
     let check = host_cal_in(folder, &["log", "check", "s", "--json"]);
     assert_eq!((check.code, check.json()["gaps"].as_u64(), check.json()["damaged"].as_u64()), (1, Some(1), Some(0)));
     assert_eq!(check.json()["samples"], run.json()["samples"]);
-    let exported = host_cal_in(folder, &["log", "export", "s", "--csv", "s.csv", "--json"]);
+    let files = ["--csv", "s.csv", "--parquet", "s.parquet", "--mcap", "s.mcap"];
+    let exported = host_cal_in(folder, &[&["log", "export", "s", "--json"][..], &files].concat());
     assert_eq!(exported.json()["samples"], run.json()["samples"]);
+    assert_eq!(exported.json()["settled"], run.json()["settled"]);
     let table = std::fs::read_to_string(folder.join("s.csv")).unwrap();
     assert_eq!(table.lines().count() as u64, run.json()["samples"].as_u64().unwrap() + 1);
     let segments: std::collections::BTreeSet<&str> = table.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
     assert_eq!(segments.len(), 2, "two stretches with the gap between them: {segments:?}");
+    if !is_skipped() {
+        let read =
+            python("log_tables.py", &["s.csv", "s.parquet", "s.mcap"].map(|name| folder.join(name)).each_ref().map(|p| &**p));
+        let read: serde_json::Value = serde_json::from_str(&read).unwrap();
+        assert_eq!((&read["row_count"], &read["messages"]["/settled"]), (&run.json()["samples"], &run.json()["settled"]));
+        // The host's clock and both boards' agree on when it was, to what greeting a board takes.
+        let unix_us = |row: usize| read["rows"][row]["unix_us"].as_i64().unwrap() as f64;
+        let now_us = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_micros() as f64;
+        assert!(unix_us(0) < unix_us(1) && (0.0..60e6).contains(&(now_us - unix_us(1))), "{read}");
+    }
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! `host-cal log`: check and export the log of a session.
 
-use std::io::BufWriter;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -9,8 +8,7 @@ use serde::Serialize;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
-use crate::files::write_atomically_with;
-use crate::session::{ExportError, LogReader, LogSummary, export_csv};
+use crate::session::{LogExportError, LogFormat, LogReader, LogSummary, export_log};
 
 /// Check or export the log of a session (stream.bbl)
 #[derive(Args)]
@@ -29,17 +27,36 @@ enum LogCommand {
         #[command(flatten)]
         output: OutputArgs,
     },
-    /// Write every sample as a line of a table
-    #[command(after_help = "Example:\n  host-cal log export today --csv today.csv")]
+    /// Write what a log holds for other programs: a table of its samples, or everything as timed messages
+    #[command(
+        after_help = "Examples:\n  host-cal log export today --csv today.csv\n  host-cal log export today --parquet today.parquet --mcap today.mcap\n\nCSV and Parquet hold every sample as a row, for pandas, DuckDB and others. MCAP holds samples, settled poses, tool poses\nand what happened, for Foxglove. All files are written, or none."
+    )]
     Export {
         /// A session's directory, or its stream.bbl
         session: PathBuf,
-        /// Table to write
-        #[arg(long, value_name = "FILE")]
-        csv: PathBuf,
+        #[command(flatten)]
+        files: ExportFiles,
         #[command(flatten)]
         output: OutputArgs,
     },
+}
+
+/// What to write; one at least.
+#[derive(Args, Serialize)]
+#[group(required = true, multiple = true)]
+struct ExportFiles {
+    /// Samples as lines of text
+    #[arg(long, value_name = "FILE")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    csv: Option<PathBuf>,
+    /// Samples as typed columns
+    #[arg(long, value_name = "FILE")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parquet: Option<PathBuf>,
+    /// Samples, settled poses, tool poses and what happened as timed messages
+    #[arg(long, value_name = "FILE")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mcap: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -50,22 +67,25 @@ struct CheckReport {
 }
 
 #[derive(Serialize)]
-struct ExportReport {
+struct ExportReport<'a> {
     log: String,
-    csv: String,
+    #[serde(flatten)]
+    files: &'a ExportFiles,
     samples: u64,
+    settled: u64,
+    tool_poses: u64,
 }
 
 impl LogArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         match &self.what {
             LogCommand::Check { session, output } => check(session, output.json),
-            LogCommand::Export { session, csv, output } => export(session, csv, output.json),
+            LogCommand::Export { session, files, output } => export(session, files, output.json),
         }
     }
 }
 
-fn check(session: &std::path::Path, json: bool) -> Result<Outcome, CommandError> {
+fn check(session: &Path, json: bool) -> Result<Outcome, CommandError> {
     let mut reader = LogReader::open(session)?;
     let summary = LogSummary::read(&mut reader)?;
     let report = CheckReport { log: reader.path().display().to_string(), summary };
@@ -73,25 +93,24 @@ fn check(session: &std::path::Path, json: bool) -> Result<Outcome, CommandError>
     Ok(if report.is_whole() { Outcome::Good } else { Outcome::Doubtful })
 }
 
-/// Writes the table under a temporary name and renames it.
-fn export(session: &std::path::Path, csv: &std::path::Path, json: bool) -> Result<Outcome, CommandError> {
-    let mut reader = LogReader::open(session)?;
-    let (mut samples, mut unreadable) = (0, None);
-    write_atomically_with(csv, |file| {
-        match export_csv(&mut reader, &mut BufWriter::new(file)) {
-            Ok(lines) => samples = lines,
-            Err(ExportError::Write(error)) => return Err(error),
-            Err(ExportError::Log(error)) => {
-                unreadable = Some(error);
-                return Err(std::io::Error::other("the log cannot be read"));
-            }
-        }
-        Ok(())
-    })
-    .map_err(|error| unreadable.take().map_or_else(|| CommandError::output(error), CommandError::from))?;
-    let report = ExportReport { log: reader.path().display().to_string(), csv: csv.display().to_string(), samples };
+fn export(session: &Path, files: &ExportFiles, json: bool) -> Result<Outcome, CommandError> {
+    let log = LogReader::open(session)?.path().display().to_string();
+    let exported = export_log(session, &files.named()).map_err(|error| match error {
+        LogExportError::Write(error) => CommandError::output(error),
+        LogExportError::Log(_) | LogExportError::SameFile { .. } => error.into(),
+    })?;
+    let report =
+        ExportReport { log, files, samples: exported.samples, settled: exported.settled, tool_poses: exported.tool_poses };
     print(&report, json)?;
     Ok(Outcome::Good)
+}
+
+impl ExportFiles {
+    /// The files that were asked for.
+    fn named(&self) -> Vec<(LogFormat, PathBuf)> {
+        let all = [(LogFormat::Csv, &self.csv), (LogFormat::Parquet, &self.parquet), (LogFormat::Mcap, &self.mcap)];
+        all.into_iter().filter_map(|(format, path)| Some((format, path.clone()?))).collect()
+    }
 }
 
 impl CheckReport {
@@ -123,8 +142,15 @@ impl Report for CheckReport {
     }
 }
 
-impl Report for ExportReport {
+impl Report for ExportReport<'_> {
     fn text(&self) -> String {
-        format!("{} samples of {} written to {}\n", self.samples, self.log, self.csv)
+        let Self { log, samples, settled, tool_poses, .. } = self;
+        let named = |(format, path): (LogFormat, PathBuf)| match format {
+            LogFormat::Csv | LogFormat::Parquet => format!("{}: {samples} samples\n", path.display()),
+            LogFormat::Mcap => {
+                format!("{}: {samples} samples, {settled} settled poses, {tool_poses} tool poses\n", path.display())
+            }
+        };
+        format!("of {log}:\n") + &self.files.named().into_iter().map(named).collect::<String>()
     }
 }

@@ -6,6 +6,7 @@
 mod apply;
 mod collect;
 mod compensate;
+mod completions;
 #[cfg(unix)]
 mod demo;
 mod export;
@@ -18,6 +19,7 @@ mod inputs;
 mod lines;
 mod log;
 mod lvdt;
+mod manual;
 mod outcome;
 mod paper;
 mod plan;
@@ -34,11 +36,13 @@ mod simulate;
 mod status;
 mod stream;
 mod table;
+#[cfg(not(unix))]
+mod unix_only;
 mod validate;
 #[cfg(unix)]
 mod virtual_board;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 pub use outcome::{CommandError, Outcome};
 pub use report::show_error;
@@ -82,6 +86,12 @@ enum Command {
     VirtualBoard(virtual_board::VirtualBoardArgs),
     #[cfg(unix)]
     Demo(demo::DemoArgs),
+    #[cfg(not(unix))]
+    VirtualBoard(unix_only::UnixOnlyArgs),
+    #[cfg(not(unix))]
+    Demo(unix_only::UnixOnlyArgs),
+    Completions(completions::CompletionsArgs),
+    Manual(manual::ManualArgs),
 }
 
 impl Cli {
@@ -115,6 +125,12 @@ impl Cli {
             Command::VirtualBoard(args) => args.run(),
             #[cfg(unix)]
             Command::Demo(args) => args.run(),
+            #[cfg(not(unix))]
+            Command::VirtualBoard(args) => args.run("virtual-board"),
+            #[cfg(not(unix))]
+            Command::Demo(args) => args.run("demo"),
+            Command::Completions(args) => args.run(Self::command()),
+            Command::Manual(args) => args.run(Self::command()),
         }
     }
 }

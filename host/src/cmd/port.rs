@@ -13,7 +13,7 @@ use crate::board::{BAUD, BoardLink};
 /// Which board.
 #[derive(Args)]
 pub(super) struct PortArgs {
-    /// Serial port of the board, as `host-cal ports` lists it
+    /// Serial port of the board, as `host-cal ports` lists it: /dev/ttyUSB0, on macOS /dev/cu.usbserial-1, on Windows COM3
     pub(super) port: String,
     /// Bits a second
     #[arg(long, default_value_t = BAUD)]

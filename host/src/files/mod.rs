@@ -28,4 +28,5 @@ pub use solids::Solids;
 pub use source::{InputError, Source};
 pub use targets::{Goal, Target, compensated_csv, read_targets};
 pub use urdf::{ENCODER_ELEMENT, Imported, UrdfEnds, parse_urdf, read_urdf};
+pub(crate) use write::{PendingFile, commit_all};
 pub use write::{WriteError, check_writable, write_atomically, write_atomically_with};

@@ -8,6 +8,8 @@ use miette::Diagnostic;
 use tempfile::NamedTempFile;
 use thiserror::Error;
 
+use crate::platform;
+
 /// A file could not be written; what stood there before still stands there.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{}: cannot be written: {error}", path.display())]
@@ -31,7 +33,9 @@ pub fn write_atomically(path: &Path, contents: &str) -> Result<(), WriteError> {
 /// # Errors
 /// As [`write_atomically`].
 pub fn write_atomically_with(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> Result<(), WriteError> {
-    replace(path, write).map_err(|error| refuse(path, error))
+    let mut file = PendingFile::begin(path)?;
+    write(file.file_mut()).map_err(|error| WriteError::new(path, error))?;
+    commit_all([file])
 }
 
 /// Whether a file could be written: to be asked before a long computation of what it is to hold.
@@ -39,44 +43,65 @@ pub fn write_atomically_with(path: &Path, write: impl FnOnce(&mut File) -> std::
 /// # Errors
 /// As [`write_atomically`].
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
-    begin(path).map(|_| ()).map_err(|error| refuse(path, error))
+    PendingFile::begin(path).map(|_| ())
 }
 
-fn refuse(path: &Path, error: std::io::Error) -> WriteError {
-    // Without the temporary name that the error may carry, which means nothing to the user.
-    let error = if error.raw_os_error().is_none() && error.kind() != ErrorKind::Other { error.kind().into() } else { error };
-    WriteError { path: path.to_owned(), error }
+impl WriteError {
+    /// What keeps a file from being written, or an error of whoever makes its contents.
+    pub(crate) fn new(path: &Path, error: std::io::Error) -> Self {
+        // Without the temporary name that the error may carry, which means nothing to the user.
+        let is_bare = error.raw_os_error().is_none() && error.kind() != ErrorKind::Other;
+        let error = if is_bare { error.kind().into() } else { error };
+        Self { path: path.to_owned(), error }
+    }
 }
 
-fn replace(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> std::io::Result<()> {
-    let (mut file, target) = begin(path)?;
-    write(file.as_file_mut())?;
-    file.as_file().sync_all()?;
-    file.persist(&target).map_err(|error| error.error)?;
+/// A file that is being written under a temporary name. Dropped without [`commit_all`], it leaves no trace.
+pub(crate) struct PendingFile {
+    file: NamedTempFile,
+    path: PathBuf,
+    /// What it is to be renamed to: what `path` names, links followed.
+    target: PathBuf,
+}
+
+impl PendingFile {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// As [`write_atomically`].
+    pub(crate) fn begin(path: &Path) -> Result<Self, WriteError> {
+        let begin = || {
+            let target = match path.canonicalize() {
+                Ok(target) if target.is_file() => target,
+                Ok(_) => return Err(std::io::Error::other("it is there, but is no regular file")),
+                Err(_) => path.to_owned(),
+            };
+            let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let mut builder = tempfile::Builder::new();
+            platform::with_usual_permissions(&mut builder);
+            Ok((builder.prefix(".host-cal-").tempfile_in(folder)?, target))
+        };
+        let (file, target) = begin().map_err(|error| WriteError::new(path, error))?;
+        Ok(Self { file, path: path.to_owned(), target })
+    }
+
+    /// Where to write.
+    pub(crate) fn file_mut(&mut self) -> &mut File {
+        self.file.as_file_mut()
+    }
+}
+
+/// Flushes files to the disk, and renames them when that has worked for all.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub(crate) fn commit_all(files: impl IntoIterator<Item = PendingFile>) -> Result<(), WriteError> {
+    let files: Vec<PendingFile> = files.into_iter().collect();
+    for PendingFile { file, path, .. } in &files {
+        file.as_file().sync_all().map_err(|error| WriteError::new(path, error))?;
+    }
+    for PendingFile { file, path, target } in files {
+        file.persist(&target).map_err(|error| WriteError::new(&path, error.error))?;
+    }
     Ok(())
 }
-
-/// A temporary file, and what it is to be renamed to.
-fn begin(path: &Path) -> std::io::Result<(NamedTempFile, PathBuf)> {
-    let target = match path.canonicalize() {
-        Ok(target) if target.is_file() => target,
-        Ok(_) => return Err(std::io::Error::other("it is there, but is no regular file")),
-        Err(_) => path.to_owned(),
-    };
-    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    with_usual_permissions(&mut builder);
-    let file = builder.prefix(".host-cal-").tempfile_in(folder)?;
-    Ok((file, target))
-}
-
-/// Temporary files are private by default; a file renamed into place should have the mode that a plain write gives, which is
-/// what the process's umask leaves of this.
-#[cfg(unix)]
-fn with_usual_permissions(builder: &mut tempfile::Builder<'_, '_>) {
-    use std::os::unix::fs::PermissionsExt;
-    builder.permissions(std::fs::Permissions::from_mode(0o666));
-}
-
-#[cfg(not(unix))]
-fn with_usual_permissions(_: &mut tempfile::Builder<'_, '_>) {}

@@ -14,7 +14,7 @@ mod pose_file;
 mod recorder;
 
 pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
-pub use export::{ExportError, export_csv};
+pub use export::{Exported, LogExportError, LogFormat, export_log};
 pub use log::{LogError, LogReader, LogSummary, LogWriter, Record};
 pub use pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 pub use recorder::{Connection, MeasuredPose, RecordError, Recorder};

@@ -119,7 +119,7 @@ impl MoverArgs {
 }
 
 fn parse_ports(text: &str) -> Result<UrPorts, String> {
-    let ports: Result<Vec<u16>, _> = text.split(',').map(|port| port.trim().parse()).collect();
+    let ports: Result<Vec<u16>, _> = text.split(',').map(|port| port.trim().parse::<u16>()).collect();
     match ports.as_deref() {
         Ok(&[script, rtde, dashboard]) => Ok(UrPorts { script, rtde, dashboard }),
         _ => Err("expected three ports, as in 30002,30004,29999".into()),
