@@ -3,7 +3,7 @@
 mod shells;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::readers::{is_skipped, python};
@@ -86,7 +86,7 @@ fn hard(folder: &TempDir) -> PathBuf {
     folder.path().join("hard.html")
 }
 
-fn findings(looks: &Value, page: &PathBuf) -> Vec<String> {
+fn findings(looks: &Value, page: &Path) -> Vec<String> {
     let findings = looks[page.to_str().expect("a name")]["findings"].as_array().expect("findings");
     findings.iter().map(|finding| finding.as_str().expect("words").to_owned()).collect()
 }

@@ -121,7 +121,7 @@ impl Axis<'_> {
             Labels::Numbers => number_label(value, self.range.end - self.range.start),
             Labels::Powers if is_whole && (-3.0..=4.0).contains(&whole) => fixed(10_f64.powf(whole), (-whole).max(0.0) as usize),
             Labels::Powers if is_whole => format!("1e{whole}"),
-            Labels::Names(names) if is_whole && whole >= 0.0 && whole as usize % every == 0 => {
+            Labels::Names(names) if is_whole && whole >= 0.0 && (whole as usize).is_multiple_of(every) => {
                 names.get(whole as usize).map(|name| shortened(name)).unwrap_or_default()
             }
             Labels::Powers | Labels::Names(_) => String::new(),
