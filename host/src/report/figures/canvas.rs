@@ -166,7 +166,8 @@ fn number_label(value: f64, range: f64) -> String {
     if value.abs() < range * 1e-6 { "0".to_owned() } else { format!("{value:.1e}").replace(".0e", "e") }
 }
 
-fn shortened(name: &str) -> String {
+/// A name that fits into a figure.
+pub(super) fn shortened(name: &str) -> String {
     if name.chars().count() <= LONGEST_NAME {
         return name.to_owned();
     }

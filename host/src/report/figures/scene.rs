@@ -3,7 +3,7 @@
 use ballbar::Vector3;
 use plotters::prelude::{Circle, Color, IntoFont, PathElement, Rectangle, Text};
 
-use super::canvas::{CHUCKS, HEIGHT, INK, WIDTH, draw};
+use super::canvas::{CHUCKS, HEIGHT, INK, WIDTH, draw, shortened};
 use super::table::{Table, number};
 use super::{Figure, FigureError, Frame};
 use crate::report::facts::{Facts, Shell};
@@ -40,7 +40,7 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
         for (i, (name, at)) in facts.chucks.iter().enumerate() {
             let (x, y) = view.at(at);
             area.draw(&Rectangle::new([(x - 11, y - 11), (x + 11, y + 11)], CHUCKS[i % CHUCKS.len()].0.filled()))?;
-            area.draw(&Text::new(name.clone(), (x + 16, y - 40), ("sans-serif", TEXT).into_font().color(&INK)))?;
+            area.draw(&Text::new(shortened(name), (x + 16, y - 40), ("sans-serif", TEXT).into_font().color(&INK)))?;
         }
         Ok(())
     })?;
