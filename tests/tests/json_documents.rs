@@ -134,6 +134,23 @@ fn validate_documents_the_residuals() {
 }
 
 #[test]
+fn report_documents_its_verdict_and_proofs() {
+    let folder = puma();
+    let report = document(&folder, 0, &[&["report"], &DESIGN, &["poses.csv", "--validate", "other.csv", "--out", "report.html"]]);
+    assert_eq!((&report["out"], &report["verdict"]), (&"report.html".into(), &"calibrated".into()));
+    assert_eq!((count(&report["poses"]), list(&report["reasons"]).len(), list(&report["not_drawn"]).len()), (180, 0, 0));
+    near(&report["rms_initial_mm"], 9.427, 1e-3);
+    near(&report["rms_mm"], 0.068, 1e-3);
+    let unseen = list(&report["unseen"]);
+    assert_eq!((unseen.len(), text(&unseen[0]["name"]), count(&unseen[0]["poses"])), (2, "other.csv", 90));
+    for proof in unseen {
+        assert!(number(&proof["rms_mm"]) < number(&proof["max_abs_mm"]) && number(&proof["rms_initial_mm"]) > 5.0, "{proof}");
+        near(&proof["mean_mm"], 0.0, 0.05);
+    }
+    assert_eq!(list(&report["figures"]).len(), 11);
+}
+
+#[test]
 fn rank_documents_the_singular_values() {
     let folder = puma();
     let all = document(&folder, 0, &[&["rank"], &DESIGN, &["poses.csv"]]);

@@ -7,16 +7,16 @@ use std::fs;
 use ballbar::Kinematics;
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::experiment::Puma;
-use host_cal::files::{RIGS, ROBOTS};
-use host_cal::identify::{FitOptions, fit};
-use host_cal::report::{Facts, Inputs, figures};
+use host_cal::files::{Dataset, RIGS, ROBOTS};
+use host_cal::identify::{Fit, FitOptions, fit};
+use host_cal::report::{Answer, Facts, Inputs, figures};
 use host_cal::simulate::tool_error;
 use serde_json::Value;
 use shells::{DESIGN, puma, runs};
 use tempfile::TempDir;
 
 const REPORT: [&str; 4] = ["report", "poses.csv", "--out", "report.html"];
-const FIGURES: [&str; 10] = [
+const FIGURES: [&str; 11] = [
     "held-out",
     "shell",
     "histogram",
@@ -26,6 +26,7 @@ const FIGURES: [&str; 10] = [
     "pairings",
     "time",
     "joints",
+    "scene",
     "correlation",
 ];
 
@@ -33,12 +34,23 @@ fn page(folder: &TempDir) -> String {
     fs::read_to_string(folder.path().join("report.html")).expect("a page")
 }
 
-fn facts_of(puma: &Puma, sigma_m: f64) -> (Facts, host_cal::files::Dataset, host_cal::identify::Fit) {
+fn facts_of(puma: &Puma, sigma_m: f64) -> (Facts, Dataset, Fit) {
     let dataset = puma.shells(0.46, 30, sigma_m, 3);
     let fit = fit(&puma.design, &dataset, &FitOptions::default()).expect("enough poses");
-    let inputs =
-        Inputs { robot: &puma.design, rig: &puma.rig, dataset: &dataset, fit: &fit, unseen: &[], objection: None, remarks: &[] };
-    (Facts::new(&inputs), dataset, fit)
+    (facts(puma, &dataset, &fit), dataset, fit)
+}
+
+fn facts(puma: &Puma, dataset: &Dataset, fit: &Fit) -> Facts {
+    Facts::new(&Inputs {
+        robot: &puma.design,
+        rig: &puma.rig,
+        rig_name: "triangles",
+        dataset,
+        fit,
+        unseen: &[],
+        objection: None,
+        remarks: &[],
+    })
 }
 
 #[test]
@@ -48,13 +60,19 @@ fn the_page_says_what_validate_says() {
     runs(&folder, &[&["fit", "poses.csv", "--out", "calibrated.toml"], &DESIGN]);
     let by_validate =
         runs(&folder, &[&["validate", "--robot", "calibrated.toml", "--rig", "triangles", "other.csv", "--json"]]).json();
-    assert_eq!(told["calibrated"], true);
+    assert_eq!((&told["verdict"], &told["reasons"]), (&"calibrated".into(), &serde_json::json!([])));
     let number = |value: &Value| value.as_f64().expect("a number");
     let rms_mm = number(&told["unseen"][0]["rms_mm"]);
     assert!((rms_mm - number(&by_validate["rms_mm"])).abs() < 1e-6, "{told} {by_validate}");
     let page = page(&folder);
     assert!(page.contains("<h1>Calibrated</h1>"), "the first screen answers");
     assert!(page.contains(&format!("<dd>{rms_mm:.3} mm</dd>")), "the first screen has {rms_mm}");
+    let max_abs_mm = number(&by_validate["max_abs_mm"]);
+    assert!((number(&told["unseen"][0]["max_abs_mm"]) - max_abs_mm).abs() < 1e-6);
+    assert!(page.contains(&format!("<dd>{max_abs_mm:.3} mm</dd>")));
+    for named in ["Robot puma560 (built in); rig triangles; poses poses.csv", "On other.csv, 90 lengths"] {
+        assert!(page.contains(named), "{named}");
+    }
 }
 
 #[test]
@@ -75,6 +93,9 @@ fn the_page_is_one_file_that_asks_for_no_other() {
         assert!(columns.len() > 1 && columns.iter().all(|&count| count == columns[0]), "{name}: {columns:?}");
     }
     assert_eq!(page.matches("<svg").count(), FIGURES.len());
+    let parameters = fs::read_to_string(folder.path().join("figures/parameters.csv")).expect("parameters");
+    assert_eq!(parameters.lines().count(), 1 + 54);
+    assert!(parameters.contains("\nx2,mm,-180.000000000000,"), "{parameters}");
 }
 
 #[test]
@@ -92,6 +113,7 @@ fn names_from_files_stay_text() {
     runs(&folder, &[&["report", "--robot", "robot.toml", "--rig", "rig.toml", "<i>.csv", "--out", "report.html"]]);
     let page = page(&folder);
     assert!(page.contains("&lt;/script&gt;&lt;i onclick=alert(1)&gt;&amp;"), "the name is shown");
+    assert!(page.contains("<p class=\"robot\">&lt;/script&gt;"), "so is the robot's");
     assert!(!page.contains("<i"), "a name became an element");
     assert_eq!(page.matches("</script>").count(), 2, "a name ended a script");
 }
@@ -104,7 +126,9 @@ fn a_fit_that_other_lengths_speak_against_is_not_called_calibrated() {
     runs(&folder, &[&of_design, &["--out", "design.csv"]]);
     let run = host_cal_in(folder.path(), &[&REPORT[..], &DESIGN, &["--validate", "design.csv", "--json"]].concat());
     assert_eq!(run.code, 1, "{}", run.transcript());
-    assert_eq!(run.json()["calibrated"], false);
+    let told = run.json();
+    assert_eq!(told["verdict"], "not_trusted");
+    assert_eq!(told["reasons"], serde_json::json!(["The design predicts better than the fit on design.csv."]));
     assert!(page(&folder).contains("<h1>Not to be trusted as it is</h1>"));
 }
 
@@ -166,4 +190,86 @@ fn correlations_are_one_on_the_diagonal_and_symmetric() {
         assert!((0..i).all(|j| (values[(i, j)] - values[(j, i)]).abs() < 1e-9 && values[(i, j)].abs() <= 1.0));
     }
     assert_eq!(figures(&facts).expect("drawn").len(), FIGURES.len());
+}
+
+#[test]
+fn an_outlier_drift_and_few_parameters_are_reasons_for_reserve() {
+    let puma = Puma::default();
+    let mut dataset = puma.shells(0.46, 30, 84e-6, 3);
+    let fitted = |dataset: &Dataset| fit(&puma.design, dataset, &FitOptions::default()).expect("enough poses");
+    assert_eq!(facts(&puma, &dataset, &fitted(&dataset)).verdict().answer, Answer::Calibrated);
+
+    let reasons = |dataset: &Dataset| {
+        let verdict = facts(&puma, dataset, &fitted(dataset)).verdict();
+        assert_eq!(verdict.answer, Answer::Reserved, "{:?}", verdict.reasons);
+        verdict.reasons.join(" ")
+    };
+    dataset.rows[17].measurement.length_m += 2e-3;
+    assert!(reasons(&dataset).contains("1 length stands out"), "{}", reasons(&dataset));
+
+    dataset.rows[17].measurement.length_m -= 2e-3;
+    for (i, row) in dataset.rows.iter_mut().enumerate() {
+        row.measurement.length_m += 3e-3 * (i as f64 / 60.0).sin();
+    }
+    assert!(reasons(&dataset).contains("Residuals follow one another"), "{}", reasons(&dataset));
+
+    let mut one_pairing = puma.shells(0.46, 200, 84e-6, 3);
+    one_pairing.rows.retain(|row| row.pairing.chuck == 0 && row.pairing.sphere == 0);
+    assert!(reasons(&one_pairing).contains("of the 36 parameters"), "{}", reasons(&one_pairing));
+}
+
+#[test]
+fn a_robot_that_is_as_designed_has_nothing_to_correct() {
+    let puma = Puma::default();
+    let same = Puma { truth: host_cal::files::Robot::open("puma560").expect("built in"), ..Puma::default() };
+    let dataset = same.shells(0.46, 30, 0.0, 3);
+    let fit = fit(&puma.design, &dataset, &FitOptions::default()).expect("enough poses");
+    let facts = facts(&puma, &dataset, &fit);
+    assert_eq!(facts.verdict().answer, Answer::Unchanged, "{:?}", facts.verdict());
+    let figures = figures(&facts).expect("drawn");
+    let missing: Vec<&str> = figures.iter().filter(|figure| figure.drawing.is_none()).map(|figure| figure.name).collect();
+    assert_eq!(missing, ["histogram"], "residuals of exactly zero have no distribution");
+}
+
+#[test]
+fn poses_that_the_fit_has_seen_are_refused_as_a_proof() {
+    let folder = puma();
+    let poses = fs::read_to_string(folder.path().join("poses.csv")).expect("poses");
+    let seen: String = poses.lines().take(4).map(|line| format!("{line}\n")).collect();
+    fs::write(folder.path().join("seen.csv"), seen).expect("a file");
+    let run = host_cal_in(folder.path(), &[&REPORT[..], &DESIGN, &["--validate", "seen.csv"]].concat());
+    assert_eq!(run.code, 2, "{}", run.transcript());
+    assert!(run.stderr.contains("seen.csv: 3 of its 3 poses are among the fitted ones"), "{}", run.stderr);
+    assert!(!folder.path().join("report.html").exists());
+}
+
+#[test]
+fn figures_that_cannot_be_drawn_say_why() {
+    let folder = puma();
+    let poses = fs::read_to_string(folder.path().join("poses.csv")).expect("poses");
+    let two: String = poses.lines().take(3).map(|line| format!("{line}\n")).collect();
+    fs::write(folder.path().join("two.csv"), two).expect("a file");
+    // Two lengths and one free parameter: neither can be left out, and nothing can be correlated.
+    let kinds = ["x", "y", "z", "alpha", "beta", "gamma", "offset", "scale"];
+    let names = (0..54).map(|i| format!("{}{}", kinds[i % 8], i / 8 + 1)).filter(|name| name != "x1");
+    let hold = names.collect::<Vec<_>>().join(",");
+    let run = host_cal_in(
+        folder.path(),
+        &[&["report", "two.csv", "--out", "report.html", "--svg", "figures", "--hold", &hold, "--json"][..], &DESIGN].concat(),
+    );
+    assert_eq!(run.code, 1, "{}", run.transcript());
+    let told = run.json();
+    let page = page(&folder);
+    let missing = told["not_drawn"].as_array().expect("a list");
+    assert_eq!(
+        missing.iter().map(|one| one["name"].as_str().unwrap_or_default()).collect::<Vec<_>>(),
+        ["held-out", "correlation"]
+    );
+    for one in missing {
+        let (name, why) = (one["name"].as_str().unwrap_or_default(), one["why"].as_str().unwrap_or_default());
+        assert!(why.starts_with("Not drawn: ") && page.contains(why), "{one}");
+        assert!(page.contains(&format!("<figure id=\"{name}\" class=\"missing")), "{name}");
+        assert!(!folder.path().join(format!("figures/{name}.svg")).exists(), "{name}");
+    }
+    assert_eq!(told["figures"].as_array().map(Vec::len), Some(FIGURES.len() - 2));
 }

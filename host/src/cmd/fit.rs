@@ -90,7 +90,7 @@ pub(super) struct FitReport {
     outliers: Vec<usize>,
     outlier_details: Vec<OutlierLine>,
     largest: Vec<ResidualLine>,
-    pub(super) remarks: Vec<String>,
+    remarks: Vec<String>,
     warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<String>,
@@ -163,7 +163,7 @@ impl FitArgs {
 
 impl FitReport {
     pub(super) fn new(measured: &Measured, fit: &Fit) -> Self {
-        let Measured { robot, rig, dataset, held_out, warnings } = measured;
+        let Measured { robot, rig, dataset, held_out, warnings, .. } = measured;
         let held_out_rows = held_out.as_ref().map(|(rule, rows)| HeldOutRows::new(rule, rows, robot, &fit.solution.chain));
         let test = match fit.solution.status {
             Status::Converged(ConvergenceTest::Gradient) => Some("gradient"),
@@ -258,7 +258,7 @@ fn outlier_remark(dataset: &Dataset, fit: &Fit) -> Option<String> {
 }
 
 /// Parameters that went where no robot's are.
-fn runaway_remark(fit: &Fit) -> Option<String> {
+pub(super) fn runaway_remark(fit: &Fit) -> Option<String> {
     const IMPLAUSIBLY_FAR: f64 = 20.0;
     let far = |parameter: &&FittedParameter| {
         (parameter.fitted - parameter.initial).abs() > IMPLAUSIBLY_FAR * plausible_error(parameter.unit)

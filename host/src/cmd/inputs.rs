@@ -30,7 +30,7 @@ pub(super) struct MeasuredArgs {
     #[arg(long)]
     rig: Option<String>,
     /// Keep poses apart: bar=610, pairing=A:1 or set=NAME, several separated by commas. `fit` and `rank` take the others, `validate`
-    /// takes these
+    /// takes these, `report` shows how well a fit to the others predicts these
     #[arg(long, value_name = "KEY=VALUE,…")]
     hold_out: Option<HoldOut>,
     /// Files of measured poses (poses.csv), or sessions
@@ -42,6 +42,8 @@ pub(super) struct MeasuredArgs {
 pub(super) struct Measured {
     pub(super) robot: Robot,
     pub(super) rig: Rig,
+    /// The rig's file, or built-in name.
+    pub(super) rig_name: String,
     pub(super) dataset: Dataset,
     /// Poses that `--hold-out` keeps apart.
     pub(super) held_out: Option<(HoldOut, Dataset)>,
@@ -53,7 +55,8 @@ impl MeasuredArgs {
     /// Reads the files and says on stderr what may be wrong with them.
     pub(super) fn read(&self) -> Result<Measured, CommandError> {
         let robot = Robot::open(&self.of_session(self.robot.as_ref(), "--robot", ROBOT_NAME)?)?;
-        let rig = Rig::open(&self.of_session(self.rig.as_ref(), "--rig", RIG_NAME)?)?;
+        let rig_name = self.of_session(self.rig.as_ref(), "--rig", RIG_NAME)?;
+        let rig = Rig::open(&rig_name)?;
         let files: Vec<PathBuf> = self.poses.iter().map(|path| poses_of(path)).collect::<Result<_, _>>()?;
         let dataset = Dataset::read(files.iter().map(PathBuf::as_path), &robot, &rig)?;
         let warnings = summarise(&dataset, &dataset.warnings(&robot, &rig));
@@ -67,7 +70,7 @@ impl MeasuredArgs {
                 (Some((rule.clone(), held_out)), others)
             }
         };
-        Ok(Measured { robot, rig, dataset, held_out, warnings })
+        Ok(Measured { robot, rig, rig_name, dataset, held_out, warnings })
     }
 
     /// What was given, or else the file of that name in the sessions; they have to agree.
@@ -88,7 +91,7 @@ impl MeasuredArgs {
 }
 
 /// The file itself, or a session's.
-fn poses_of(path: &Path) -> Result<PathBuf, ListError> {
+pub(super) fn poses_of(path: &Path) -> Result<PathBuf, ListError> {
     if !path.is_dir() {
         return Ok(path.to_owned());
     }

@@ -1,5 +1,6 @@
 //! `host-cal report`: a calibration as one page for people.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -7,13 +8,13 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::fit::FitReport;
-use super::inputs::{Measured, MeasuredArgs, OutputArgs};
+use super::fit::{FitReport, runaway_remark};
+use super::inputs::{Measured, MeasuredArgs, OutputArgs, poses_of};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_file};
-use crate::files::{Dataset, check_writable};
-use crate::identify::{FitOptions, Hold, fit};
-use crate::report::{Facts, Figure, Inputs, figures, html};
+use crate::files::{Dataset, PoseRow, check_writable};
+use crate::identify::{FitOptions, Hold, fit, remarks};
+use crate::report::{Answer, Facts, Figure, Inputs, Verdict, figures, html, parameters_table};
 use crate::units::mm_from_m;
 
 /// Show a calibration as one page: is the robot calibrated, how good is it, how do we know
@@ -23,12 +24,12 @@ use crate::units::mm_from_m;
   host-cal report today --hold-out bar=610 --out report.html --svg figures --csv figures
 
 The page is one file without links: it opens in any browser, without a network, and prints.
-Exit code 1 says that the page calls the result not to be trusted.")]
+Exit code 1 says that the page calls the result not to be trusted; with reservations it is 0.")]
 pub(super) struct ReportArgs {
     #[command(flatten)]
     measured: MeasuredArgs,
-    /// Poses that the fit is not to see, to judge it by (poses.csv); may be given again
-    #[arg(long, value_name = "POSES")]
+    /// Poses that the fit is not to see, to judge it by (poses.csv, or a session); may be given again
+    #[arg(long, value_name = "SESSION|POSES")]
     validate: Vec<PathBuf>,
     /// Parameters to leave at their design values, as `fit` takes them
     #[arg(long, default_value = "auto", value_name = "RULE|NAME,…")]
@@ -39,7 +40,7 @@ pub(super) struct ReportArgs {
     /// Write the figures into this folder, one SVG file each
     #[arg(long, value_name = "DIR")]
     svg: Option<PathBuf>,
-    /// Write the figures' numbers into this folder, one CSV file each
+    /// Write the figures' numbers and the parameters into this folder, one CSV file each
     #[arg(long, value_name = "DIR")]
     csv: Option<PathBuf>,
     #[command(flatten)]
@@ -49,14 +50,24 @@ pub(super) struct ReportArgs {
 #[derive(Serialize)]
 struct PageReport {
     out: String,
-    calibrated: bool,
-    /// Why it is not to be trusted.
-    doubt: Option<String>,
+    /// `calibrated`, `unchanged`, `reserved` or `not_trusted`.
+    verdict: &'static str,
+    #[serde(skip)]
+    answer: Answer,
+    /// Why it is no better.
+    reasons: Vec<String>,
     poses: usize,
     rms_initial_mm: f64,
     rms_mm: f64,
     unseen: Vec<Unseen>,
     figures: Vec<&'static str>,
+    not_drawn: Vec<NotDrawn>,
+}
+
+#[derive(Serialize)]
+struct NotDrawn {
+    name: &'static str,
+    why: String,
 }
 
 #[derive(Serialize)]
@@ -65,6 +76,8 @@ struct Unseen {
     poses: usize,
     rms_initial_mm: f64,
     rms_mm: f64,
+    max_abs_mm: f64,
+    mean_mm: f64,
 }
 
 #[derive(Debug, Error, Diagnostic)]
@@ -80,6 +93,15 @@ struct FolderError {
 #[diagnostic(help("Give --validate a file with measured poses."))]
 struct EmptyError(PathBuf);
 
+#[derive(Debug, Error, Diagnostic)]
+#[error("{}: {seen} of its {of} poses are among the fitted ones, expected none", path.display())]
+#[diagnostic(help("What the fit has seen proves nothing. Give --validate other poses, or keep some apart with --hold-out."))]
+struct SeenError {
+    path: PathBuf,
+    seen: usize,
+    of: usize,
+}
+
 impl ReportArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let hold: Hold = self.hold.parse()?;
@@ -89,83 +111,110 @@ impl ReportArgs {
         let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, ..FitOptions::default() })?;
 
         let told = FitReport::new(&measured, &fit);
+        let remarks = remarks(&measured.robot.chain, &measured.dataset, &measured.rig, &measured.robot.limits);
         let held_out = measured.held_out.iter().map(|(rule, rows)| (format!("poses held out ({rule})"), rows));
         let unseen: Vec<(String, &Dataset)> = others.iter().map(|(name, rows)| (name.clone(), rows)).chain(held_out).collect();
         let facts = Facts::new(&Inputs {
             robot: &measured.robot,
             rig: &measured.rig,
+            rig_name: &measured.rig_name,
             dataset: &measured.dataset,
             fit: &fit,
             unseen: &unseen,
             objection: told.objection.as_deref(),
-            remarks: &[told.remarks, measured.warnings].concat(),
+            remarks: &remarks.into_iter().chain(runaway_remark(&fit)).chain(measured.warnings).collect::<Vec<_>>(),
         });
         let figures = figures(&facts)?;
 
         let now = jiff::Timestamp::now();
         let when = now.round(jiff::Unit::Second).unwrap_or(now).to_string();
         write_file(&self.out, &html(&facts, &figures, &when))?;
-        write_each(self.svg.as_deref(), &figures, "svg", |figure| figure.svg.clone())?;
-        write_each(self.csv.as_deref(), &figures, "csv", |figure| figure.data.csv())?;
+        let drawn = || figures.iter().filter_map(|figure| Some((figure.name, figure.drawing.as_ref()?)));
+        if let Some(folder) = &self.svg {
+            write_each(folder, drawn().map(|(name, drawing)| (format!("{name}.svg"), drawing.svg.clone())))?;
+        }
+        if let Some(folder) = &self.csv {
+            let parameters = ("parameters.csv".to_owned(), parameters_table(&facts).csv());
+            write_each(folder, drawn().map(|(name, drawing)| (format!("{name}.csv"), drawing.data.csv())).chain([parameters]))?;
+        }
 
         let report = PageReport::new(&self.out, &facts, &figures);
         print(&report, self.output.json)?;
-        Ok(if report.calibrated { Outcome::Good } else { Outcome::Doubtful })
+        Ok(if report.answer == Answer::NotTrusted { Outcome::Doubtful } else { Outcome::Good })
     }
 
     /// The files of `--validate`, and what to call them.
     fn others(&self, measured: &Measured) -> Result<Vec<(String, Dataset)>, CommandError> {
+        let key = |row: &PoseRow| {
+            let values = row.measurement.q.as_array().iter().chain([&row.measurement.length_m]);
+            (row.pairing, values.map(|value| value.to_bits()).collect::<Vec<_>>())
+        };
+        let fitted: HashSet<_> = measured.dataset.rows.iter().map(key).collect();
         let read = |path: &PathBuf| {
-            let rows = Dataset::read([path.as_path()], &measured.robot, &measured.rig)?;
-            if rows.rows.is_empty() { Err(EmptyError(path.clone()).into()) } else { Ok((path.display().to_string(), rows)) }
+            let rows = Dataset::read([poses_of(path)?.as_path()], &measured.robot, &measured.rig)?;
+            let seen = rows.rows.iter().filter(|row| fitted.contains(&key(row))).count();
+            match (rows.rows.len(), seen) {
+                (0, _) => Err(EmptyError(path.clone()).into()),
+                (_, 0) => Ok((path.display().to_string(), rows)),
+                (of, seen) => Err(SeenError { path: path.clone(), seen, of }.into()),
+            }
         };
         self.validate.iter().map(read).collect()
     }
 }
 
-/// One file a figure.
-fn write_each(
-    folder: Option<&Path>,
-    figures: &[Figure],
-    end: &str,
-    text: impl Fn(&Figure) -> String,
-) -> Result<(), CommandError> {
-    let Some(folder) = folder else { return Ok(()) };
+/// Files of these names and contents in a folder, which is made if need be.
+fn write_each(folder: &Path, files: impl Iterator<Item = (String, String)>) -> Result<(), CommandError> {
     let failed = |error| CommandError::output(FolderError { folder: folder.to_owned(), error });
     std::fs::create_dir_all(folder).map_err(failed)?;
-    figures.iter().try_for_each(|figure| write_file(&folder.join(format!("{}.{end}", figure.name)), &text(figure)))
+    for (name, text) in files {
+        write_file(&folder.join(name), &text)?;
+    }
+    Ok(())
 }
 
 impl PageReport {
     fn new(out: &Path, facts: &Facts, figures: &[Figure]) -> Self {
-        let doubt = facts.doubt();
-        let unseen = facts.proofs.iter().map(|proof| Unseen {
-            name: proof.name.clone(),
-            poses: proof.after.len(),
-            rms_initial_mm: mm_from_m(proof.before_summary().rms_m),
-            rms_mm: mm_from_m(proof.after_summary().rms_m),
+        let Verdict { answer, reasons, .. } = facts.verdict();
+        let unseen = facts.proofs.iter().map(|proof| {
+            let after = proof.after_summary();
+            Unseen {
+                name: proof.name.clone(),
+                poses: after.count,
+                rms_initial_mm: mm_from_m(proof.before_summary().rms_m),
+                rms_mm: mm_from_m(after.rms_m),
+                max_abs_mm: mm_from_m(after.max_abs_m),
+                mean_mm: mm_from_m(after.mean_m),
+            }
         });
+        let missing = figures.iter().filter(|figure| figure.drawing.is_none());
         Self {
             out: out.display().to_string(),
-            calibrated: doubt.is_none(),
-            doubt,
+            verdict: answer.name(),
+            answer,
+            reasons,
             poses: facts.rows.len(),
             rms_initial_mm: mm_from_m(facts.before.rms_m),
             rms_mm: mm_from_m(facts.after.rms_m),
             unseen: unseen.collect(),
-            figures: figures.iter().map(|figure| figure.name).collect(),
+            figures: figures.iter().filter(|figure| figure.drawing.is_some()).map(|figure| figure.name).collect(),
+            not_drawn: missing.map(|figure| NotDrawn { name: figure.name, why: figure.sentence.clone() }).collect(),
         }
     }
 }
 
 impl Report for PageReport {
     fn text(&self) -> String {
-        let mut text = format!("RMS {:.4} mm before, {:.4} mm after on {} poses\n", self.rms_initial_mm, self.rms_mm, self.poses);
-        for Unseen { name, poses, rms_initial_mm, rms_mm } in &self.unseen {
+        let mut text = format!("{}\n", self.answer.words());
+        for reason in &self.reasons {
+            text += &format!("  {reason}\n");
+        }
+        text += &format!("RMS {:.4} mm before, {:.4} mm after on {} poses\n", self.rms_initial_mm, self.rms_mm, self.poses);
+        for Unseen { name, poses, rms_initial_mm, rms_mm, .. } in &self.unseen {
             text += &format!("RMS {rms_initial_mm:.4} mm before, {rms_mm:.4} mm after on {name}, {poses} poses\n");
         }
-        if let Some(doubt) = &self.doubt {
-            text += &format!("NOT TO BE TRUSTED AS IT IS: {doubt}\n");
+        for NotDrawn { name, why } in &self.not_drawn {
+            text += &format!("{name}: {why}\n");
         }
         text + &format!("wrote {}\n", self.out)
     }

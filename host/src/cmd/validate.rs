@@ -57,7 +57,7 @@ impl ValidateArgs {
     }
 
     fn report(&self, measured: Measured) -> ValidateReport {
-        let Measured { robot, rig, dataset, held_out, warnings } = measured;
+        let Measured { robot, rig, dataset, held_out, warnings, .. } = measured;
         let (rule, dataset) = held_out.map_or((None, dataset), |(rule, rows)| (Some(rule.to_string()), rows));
         let residuals = residuals(&robot.chain, &dataset);
         let summary = ResidualSummary::new(&residuals);

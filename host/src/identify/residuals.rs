@@ -15,7 +15,7 @@ pub struct Residual {
 
 impl Residual {
     /// `√w f`: all of these scatter alike, metres.
-    fn whitened_m(self) -> f64 {
+    pub fn whitened_m(self) -> f64 {
         self.weight.sqrt() * self.value_m
     }
 }

@@ -1,11 +1,16 @@
 //! Everything that the page says, computed from robot, rig, poses and fit. SI units, base frame.
 
+use std::collections::BTreeMap;
+
 use ballbar::{Chain, JointKind, Kinematics, Vector3};
 use nalgebra::DMatrix;
 
+use super::verdict::Verdict;
 use super::workspace::Workspace;
 use crate::files::{Dataset, PairingId, PoseRow, Rig, Robot};
-use crate::identify::{AndersonDarling, Fit, FittedParameter, Outlier, Residual, ResidualSummary, anderson_darling, residuals};
+use crate::identify::{
+    AndersonDarling, Fit, FittedParameter, Outlier, Residual, ResidualSummary, Status, anderson_darling, residuals,
+};
 
 /// What the facts are computed from.
 #[derive(Clone, Copy, Debug)]
@@ -14,6 +19,8 @@ pub struct Inputs<'a> {
     pub robot: &'a Robot,
     /// Chucks and spheres.
     pub rig: &'a Rig,
+    /// The rig's file, or built-in name.
+    pub rig_name: &'a str,
     /// The poses that were fitted.
     pub dataset: &'a Dataset,
     /// The fit to them.
@@ -43,12 +50,27 @@ pub struct RowFact {
     pub latitude_rad: f64,
     /// When it was measured, seconds, where the file says so.
     pub t_s: Option<f64>,
+    /// Length of the bar at mid travel, metres, where the file says so.
+    pub bar_m: Option<f64>,
+    /// The measured length, metres.
+    pub length_m: f64,
     /// The sphere as the fit sees it, metres.
     pub sphere_m: Vector3<f64>,
     /// Residual with the design, measured less computed, metres.
     pub before_m: f64,
     /// The same with the fit.
     pub after_m: f64,
+    /// The same times the root of the row's weight, which is 1 on average: what scatters alike in all rows, metres.
+    pub whitened_m: f64,
+}
+
+/// A half sphere about a chuck on which poses were measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Shell {
+    /// Index into [`Facts::chucks`].
+    pub chuck: usize,
+    /// Median of the lengths, metres.
+    pub radius_m: f64,
 }
 
 /// How well lengths are predicted that the fit has not seen.
@@ -56,6 +78,8 @@ pub struct RowFact {
 pub struct Proof {
     /// Which lengths, to follow "on".
     pub name: String,
+    /// Whether no fit at all has seen them; otherwise parts of the fitted poses were left out in turn.
+    pub is_apart: bool,
     /// Residuals with the design, metres.
     pub before: Vec<Residual>,
     /// Residuals with the fit, metres.
@@ -75,7 +99,7 @@ impl Proof {
 
     /// Whether the fit predicts these lengths worse than the design does.
     pub fn speaks_against(&self) -> bool {
-        self.after_summary().rms_m > self.before_summary().rms_m
+        self.is_apart && self.after_summary().rms_m > self.before_summary().rms_m
     }
 }
 
@@ -102,6 +126,10 @@ pub struct Correlation {
 pub struct Facts {
     /// Name of the robot.
     pub robot: String,
+    /// The robot's file, or built-in name.
+    pub robot_file: String,
+    /// The rig's.
+    pub rig_file: String,
     /// Files of the fitted poses.
     pub files: Vec<String>,
     /// Kinds of the joints.
@@ -112,6 +140,8 @@ pub struct Facts {
     pub pairings: Vec<(String, usize)>,
     /// The fitted poses, in the order of measurement.
     pub rows: Vec<RowFact>,
+    /// Where they lie, as far as their lengths are alike.
+    pub shells: Vec<Shell>,
     /// Residuals of the fitted poses with the design.
     pub before: ResidualSummary,
     /// Residuals of the fitted poses with the fit.
@@ -126,11 +156,17 @@ pub struct Facts {
     pub rms_history_m: Vec<f64>,
     /// Why the solve ended.
     pub explanation: &'static str,
+    /// Whether the design was at the minimum already, and nothing was changed.
+    pub is_unchanged: bool,
+    /// The most parameters of this robot that any lengths can tell (the paper's eq. 1).
+    pub independent: usize,
+    /// How many of them the fit told: the rank of the free columns.
+    pub told: usize,
     /// Standard deviation of one length, metres.
     pub sigma_m: Option<f64>,
     /// Correlation of residuals with the next ones measured.
     pub neighbour_correlation: Option<f64>,
-    /// Whether the residuals look normal; `None` for too few.
+    /// Whether the whitened residuals look normal; `None` for too few.
     pub normality: Option<AndersonDarling>,
     /// Rows that stand out: index into `rows`.
     pub outliers: Vec<Outlier>,
@@ -151,9 +187,11 @@ impl Facts {
         let pairings = dataset.pairings();
         let before = residuals(&robot.chain, dataset);
         let rows = rows(inputs, &pairings, &before);
-        let after_m: Vec<f64> = rows.iter().map(|row| row.after_m).collect();
+        let whitened_m: Vec<f64> = rows.iter().map(|row| row.whitened_m).collect();
         Self {
             robot: robot.name.clone(),
+            robot_file: robot.source_name().to_owned(),
+            rig_file: inputs.rig_name.to_owned(),
             files: dataset.files.clone(),
             joints: robot.chain.joint_kinds().to_vec(),
             chucks: rig.chucks.iter().map(|chuck| (chuck.name.clone(), chuck.position_m)).collect(),
@@ -168,28 +206,35 @@ impl Facts {
             },
             rms_history_m: fit.solution.rms_history_m.clone(),
             explanation: fit.solution.status.explanation(),
+            is_unchanged: fit.solution.status == Status::AlreadyOptimal,
+            independent: robot.chain.independent_parameters(),
+            told: fit.uncertainty.spectrum.rank,
             sigma_m: fit.uncertainty.sigma_m,
             neighbour_correlation: fit.neighbour_correlation,
-            normality: anderson_darling(&after_m),
+            normality: anderson_darling(&whitened_m),
             outliers: fit.outliers.clone(),
             correlation: correlation(fit),
             workspace: Workspace::new(robot, fit),
             objection: inputs.objection.map(str::to_owned),
             remarks: inputs.remarks.to_vec(),
+            shells: shells(&rows, &pairings),
             rows,
         }
-    }
-
-    /// Why the result is not to be kept: the fit's own reason, or a proof that speaks against it.
-    pub fn doubt(&self) -> Option<String> {
-        let against = || self.proofs.iter().find(|proof| proof.speaks_against());
-        let worse = || against().map(|proof| format!("The design predicts better than the fit on {}.", proof.name));
-        self.objection.clone().or_else(worse)
     }
 
     /// Number of parameters that the fit was free to change.
     pub fn free_parameters(&self) -> usize {
         self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
+    }
+
+    /// Whether the files say that some lengths are surer than others.
+    pub fn is_weighted(&self) -> bool {
+        self.rows.iter().any(|row| row.whitened_m != row.after_m)
+    }
+
+    /// What the result is called, and with what reserve.
+    pub fn verdict(&self) -> Verdict {
+        Verdict::new(self)
     }
 }
 
@@ -207,12 +252,32 @@ fn rows(inputs: &Inputs<'_>, pairings: &[PairingId], before: &[Residual]) -> Vec
             longitude_rad: bar_m.y.atan2(bar_m.x).rem_euclid(std::f64::consts::TAU),
             latitude_rad: bar_m.z.atan2(bar_m.x.hypot(bar_m.y)),
             t_s: row.t_s,
+            bar_m: row.bar_m,
+            length_m: row.measurement.length_m,
             sphere_m,
             before_m: before[i].value_m,
             after_m: fit.residuals[i].value_m,
+            whitened_m: fit.residuals[i].whitened_m(),
         }
     };
     dataset.rows.iter().enumerate().map(fact).collect()
+}
+
+/// One shell a chuck and bar, where the lengths differ by no more than a bar travels.
+fn shells(rows: &[RowFact], pairings: &[PairingId]) -> Vec<Shell> {
+    /// Of the median length; the longest and shortest of other lengths lie on no sphere worth drawing.
+    const WIDEST: f64 = 0.25;
+    let mut lengths: BTreeMap<(usize, Option<u64>), Vec<f64>> = BTreeMap::new();
+    for row in rows {
+        let bar = row.bar_m.map(f64::to_bits);
+        lengths.entry((pairings[row.pairing].chuck, bar)).or_default().push(row.length_m);
+    }
+    let shell = |((chuck, _), mut lengths_m): ((usize, Option<u64>), Vec<f64>)| {
+        lengths_m.sort_by(f64::total_cmp);
+        let radius_m = lengths_m[lengths_m.len() / 2];
+        (lengths_m[lengths_m.len() - 1] - lengths_m[0] <= WIDEST * radius_m).then_some(Shell { chuck, radius_m })
+    };
+    lengths.into_iter().filter_map(shell).collect()
 }
 
 fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
@@ -220,11 +285,13 @@ fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
     let of = |chain: &Chain<f64>, rows: &Dataset| residuals(chain, rows);
     let unseen = inputs.unseen.iter().map(|(name, rows)| Proof {
         name: name.clone(),
+        is_apart: true,
         before: of(&robot.chain, rows),
         after: of(&fit.solution.chain, rows),
     });
     let folds = fit.cross_validation.map(|proof| Proof {
         name: format!("the fitted poses, each predicted by a fit without it ({} parts)", proof.folds),
+        is_apart: false,
         before,
         after: fit.left_out.clone(),
     });

@@ -1,7 +1,8 @@
 //! A calibration as one page for people: is this robot calibrated, how good is it, how do we know.
 //!
 //! ```text
-//! Robot, Rig, Dataset, Fit ─▶ Facts ─▶ figures::all (SVG, data) ─▶ page::html
+//! Robot, Rig, Dataset, Fit ─▶ Facts ─┬─▶ Verdict ────────────────────┬─▶ page::html
+//!                                    └─▶ figures::all (SVG, data) ───┘
 //! ```
 //!
 //! [`Facts`] computes and draws nothing; a figure draws and computes nothing but its scales.
@@ -9,9 +10,13 @@
 mod facts;
 mod figures;
 mod page;
+mod tables;
+mod verdict;
 mod workspace;
 
-pub use facts::{Correlation, Facts, Inputs, Proof, RowFact, Singular};
-pub use figures::{Figure, FigureError, Table, all as figures};
+pub use facts::{Correlation, Facts, Inputs, Proof, RowFact, Shell, Singular};
+pub use figures::{Drawing, Figure, FigureError, Table, all as figures};
 pub use page::html;
+pub use tables::parameters_table;
+pub use verdict::{Answer, Verdict};
 pub use workspace::{Slice, Workspace, WorkspacePoint};

@@ -1,16 +1,20 @@
 //! The page: one HTML file that needs nothing else. Whatever comes from files is escaped by the templates.
 
+use ballbar::Vector3;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::json;
 
-use super::facts::{Facts, RowFact};
-use super::figures::{Figure, dark_rules};
-use crate::identify::FittedParameter;
-use crate::units::{ScreenUnit, fixed, joints_text, mm_from_m};
+use super::facts::{Facts, Proof, RowFact};
+use super::figures::{CHUCKS, Figure, dark_rules, hex, wires_m};
+use super::tables::{largest, parameters};
+use super::verdict::{Answer, Verdict, rms_text};
+use crate::identify::ResidualSummary;
+use crate::units::{fixed, mm_from_m};
 
 const STYLE: &str = include_str!("page.css");
 const SCENE_SCRIPT: &str = include_str!("scene.js");
-const LARGEST: usize = 12;
+/// The figure that `scene.js` brings to life.
+const SCENE: &str = "scene";
 
 /// The page's text. `when` dates it.
 pub fn html(facts: &Facts, figures: &[Figure], when: &str) -> String {
@@ -28,8 +32,7 @@ pub fn html(facts: &Facts, figures: &[Figure], when: &str) -> String {
             body {
                 (first_screen(facts, when))
                 main {
-                    @for figure in figures { (figure_markup(figure)) }
-                    (scene(facts))
+                    @for figure in figures { (figure_markup(figure, facts)) }
                     (largest(facts))
                     (parameters(facts))
                 }
@@ -41,150 +44,138 @@ pub fn html(facts: &Facts, figures: &[Figure], when: &str) -> String {
 }
 
 fn first_screen(facts: &Facts, when: &str) -> Markup {
-    let doubt = facts.doubt();
-    let answer = if doubt.is_some() { "Not to be trusted as it is" } else { "Calibrated" };
-    let proof = facts.proofs.first();
-    let mm = |m: f64| format!("{} mm", fixed(mm_from_m(m), 3));
+    let Verdict { answer, reasons, not_said } = facts.verdict();
+    let colour = match answer {
+        Answer::Calibrated | Answer::Unchanged => "good",
+        Answer::Reserved => "reserved",
+        Answer::NotTrusted => "bad",
+    };
     html! {
-        header class=(if doubt.is_some() { "bad" } else { "good" }) {
+        header class=(colour) {
             p.robot { (facts.robot) }
-            h1 { (answer) }
-            @if let Some(doubt) = &doubt { p.doubt { (doubt) } }
-            dl {
-                @if let Some(proof) = proof {
-                    (big("on lengths not seen, RMS", &mm(proof.after_summary().rms_m)))
-                    (big("the same before", &mm(proof.before_summary().rms_m)))
-                    (big("largest of them", &mm(proof.after_summary().max_abs_m)))
+            h1 { (answer.words()) }
+            @for reason in &reasons { p.reason { (reason) } }
+            (numbers(facts))
+            div.words {
+                div {
+                    h2 { "How do we know?" }
+                    ul { @for ground in grounds(facts) { li { (ground) } } }
                 }
-                (big("on the fitted lengths, RMS", &mm(facts.after.rms_m)))
+                div {
+                    h2 { "What this does not say" }
+                    ul { @for limit in &not_said { li { (limit) } } }
+                }
             }
-            h2 { "How do we know?" }
-            ul {
-                li {
-                    (facts.rows.len()) " lengths of " (facts.pairings.len()) " pairings identified " (facts.free_parameters()) " of "
-                    (facts.parameters.len()) " parameters; the others are held, each for the reason in the table."
-                }
-                @for proof in &facts.proofs {
-                    li {
-                        "On " (proof.name) ", " (proof.after.len()) " lengths: " (mm(proof.before_summary().rms_m)) " RMS before, "
-                        b { (mm(proof.after_summary().rms_m)) } " after."
-                    }
-                }
-                @if facts.proofs.is_empty() { li { "Nothing was left out to prove the result on." } }
-                @if let Some(sigma_m) = facts.sigma_m { li { "One length scatters by " (mm(sigma_m)) " (standard deviation) about the fit." } }
-                li { (outliers(facts)) }
-                @for remark in &facts.remarks { li { (remark) } }
+            p.small {
+                "Robot " (facts.robot_file) "; rig " (facts.rig_file) "; poses " (facts.files.join(", ")) "; made " (when) " by host-cal "
+                (env!("CARGO_PKG_VERSION"))
             }
-            p.small { "From " (facts.files.join(", ")) "; " (when) "; host-cal " (env!("CARGO_PKG_VERSION")) }
         }
     }
 }
 
-fn outliers(facts: &Facts) -> String {
-    match facts.outliers.len() {
-        0 => "No length stands out.".to_owned(),
-        1 => "1 length stands out: look at it in the table of the largest residuals.".to_owned(),
-        count => format!("{count} lengths stand out: look at them in the table of the largest residuals."),
+/// The few numbers that matter most.
+fn numbers(facts: &Facts) -> Markup {
+    let mm = |m: f64| format!("{} mm", fixed(mm_from_m(m), 3));
+    html! {
+        dl {
+            @if let Some(proof) = facts.proofs.first() {
+                @let (before, after) = (proof.before_summary(), proof.after_summary());
+                (big("lengths not seen: RMS before", &mm(before.rms_m)))
+                (big("RMS after", &mm(after.rms_m)))
+                (big("largest after", &mm(after.max_abs_m)))
+            } @else {
+                (big("fitted lengths: RMS before", &mm(facts.before.rms_m)))
+                (big("RMS after", &mm(facts.after.rms_m)))
+            }
+            (big("poses fitted", &facts.rows.len().to_string()))
+        }
     }
+}
+
+/// What the answer rests on.
+fn grounds(facts: &Facts) -> Vec<Markup> {
+    let rms = |summary: ResidualSummary| rms_text(summary.rms_m, summary.count);
+    let pairings = facts.pairings.len();
+    let told = html! {
+        (facts.rows.len()) " lengths of " (pairings) (if pairings == 1 { " pairing" } else { " pairings" }) " tell " (facts.told)
+        " of the " (facts.independent) " parameters that lengths can tell of this robot, of " (facts.parameters.len())
+        " in all; the table says why each of the others is held."
+    };
+    let proof = |proof: &Proof| {
+        let after = proof.after_summary();
+        html! {
+            "On " (proof.name) ", " (after.count) " lengths: RMS " (rms(proof.before_summary())) " before, " b { (rms(after)) } " after; mean "
+            (fixed(mm_from_m(after.mean_m), 3)) " mm, largest " (fixed(mm_from_m(after.max_abs_m), 3)) " mm."
+        }
+    };
+    let fitted = html! {
+        "On the fitted lengths themselves: RMS " (rms(facts.before)) " before, " (rms(facts.after)) " after, which alone would prove nothing."
+    };
+    let mut grounds = vec![told];
+    grounds.extend(facts.proofs.iter().map(proof));
+    if facts.proofs.is_empty() {
+        grounds.push(html! { "Nothing was left out to prove the result on." });
+    }
+    grounds.push(fitted);
+    if let Some(sigma_m) = facts.sigma_m {
+        let sigma = fixed(mm_from_m(sigma_m), 3);
+        grounds.push(html! { "One length scatters about the fit by " (sigma) " mm (standard deviation)." });
+    }
+    if facts.outliers.is_empty() {
+        grounds.push(html! { "No length stands out from the others." });
+    }
+    grounds.extend(facts.remarks.iter().map(|remark| html! { (remark) }));
+    grounds
 }
 
 fn big(what: &str, number: &str) -> Markup {
     html! { div { dt { (what) } dd { (number) } } }
 }
 
-fn figure_markup(figure: &Figure) -> Markup {
+fn figure_markup(figure: &Figure, facts: &Facts) -> Markup {
+    let wide = if figure.wide { "wide" } else { "" };
+    let Some(drawing) = &figure.drawing else {
+        return html! { figure id=(figure.name) class={ "missing " (wide) } { h2 { (figure.title) } figcaption { (figure.sentence) } } };
+    };
     // Inside a page neither the name space nor a size of its own is needed.
     let inner =
-        figure.svg.find("viewBox").map_or("", |at| &figure.svg[at..]).replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1);
+        drawing.svg.find("viewBox").map_or("", |at| &drawing.svg[at..]).replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1);
     let svg = format!("<svg role=\"img\" aria-label=\"{}\" {inner}", figure.title);
+    let turns = figure.name == SCENE;
     html! {
-        figure id=(figure.name) class=(if figure.wide { "wide" } else { "" }) {
+        figure id=(figure.name) class=(wide) {
             h2 { (figure.title) }
-            (PreEscaped(svg))
-            figcaption { (figure.sentence) }
-        }
-    }
-}
-
-fn scene(facts: &Facts) -> Markup {
-    let points: Vec<_> = facts.rows.iter().map(|row| scene_point(facts, row)).collect();
-    let chucks: Vec<_> = facts.chucks.iter().map(|(name, at)| json!({ "name": name, "at": [at.x, at.y, at.z] })).collect();
-    // Inside a script element only `<` could end it.
-    let data = json!({ "points": points, "chucks": chucks }).to_string().replace('<', "\\u003c");
-    html! {
-        figure #scene .wide {
-            h2 { "The shells and their poses" }
-            canvas width="1600" height="900" aria-label="Spheres of all poses in space, and the chucks" {}
-            figcaption {
-                "Each dot is the tool's sphere in one pose, by the fit, in the colour of its chuck and larger for a larger residual: gaps \
-                 are places that nothing was measured at. Drag to turn it."
+            // Where it is wider than the screen, it is moved under it.
+            div.drawing tabindex=[(figure.wide && !turns).then_some("0")] { (PreEscaped(svg)) }
+            @if turns {
+                canvas tabindex="0" role="img" aria-label="The shells and their poses; arrow keys turn them" {}
+                script type="application/json" { (PreEscaped(scene_data(facts))) }
             }
-            script type="application/json" { (PreEscaped(data)) }
+            figcaption { (figure.sentence) @if turns { span.live { " Drag, or press arrow keys, to turn it." } } }
         }
     }
 }
 
-fn scene_point(facts: &Facts, row: &RowFact) -> serde_json::Value {
+/// What `scene.js` draws: base frame, metres; residuals in millimetres.
+fn scene_data(facts: &Facts) -> String {
     let rounded = |m: f64| (m * 1e5).round() / 1e5;
-    let chuck = facts.pairings.get(row.pairing).map_or(0, |pairing| pairing.1);
-    json!([rounded(row.sphere_m.x), rounded(row.sphere_m.y), rounded(row.sphere_m.z), chuck, rounded(mm_from_m(row.after_m))])
-}
-
-fn largest(facts: &Facts) -> Markup {
-    let mut order: Vec<usize> = (0..facts.rows.len()).collect();
-    order.sort_by(|&a, &b| facts.rows[b].after_m.abs().total_cmp(&facts.rows[a].after_m.abs()));
-    let stands_out = |row: usize| facts.outliers.iter().any(|outlier| outlier.row == row);
-    html! {
-        section #largest .wide {
-            h2 { "Largest residuals" }
-            p { "Poses to look at, or to measure again; a row in bold stands out from all others or from its neighbours." }
-            div.scroll { table {
-                thead { tr { th { "at" } th { "pairing" } th.number { "before, mm" } th.number { "after, mm" } th { "joints" } } }
-                tbody { @for &i in order.iter().take(LARGEST) {
-                    @let row = &facts.rows[i];
-                    tr class=(if stands_out(i) { "out" } else { "" }) {
-                        td { (row.place) }
-                        td { (facts.pairings.get(row.pairing).map_or("", |pairing| &pairing.0)) }
-                        td.number { (fixed(mm_from_m(row.before_m), 3)) }
-                        td.number { (fixed(mm_from_m(row.after_m), 3)) }
-                        td { (joints_text(&facts.joints, &row.q)) }
-                    }
-                } }
-            } }
-        }
-    }
-}
-
-fn parameters(facts: &Facts) -> Markup {
-    html! {
-        section #parameters .wide {
-            h2 { "Parameters" }
-            p { "What the design said, what these poses say, and how surely; held parameters keep their design value (the paper's Table II)." }
-            div.scroll { table {
-                thead { tr {
-                    th { "name" } th { "unit" } th.number { "initial" } th.number { "final" } th.number { "change" }
-                    th.number { "deviation" } th { "held" }
-                } }
-                tbody { @for parameter in &facts.parameters { (parameter_row(parameter)) } }
-            } }
-        }
-    }
-}
-
-fn parameter_row(parameter: &FittedParameter) -> Markup {
-    let unit = ScreenUnit::from(parameter.unit);
-    let number = |si: f64| fixed(unit.from_si(si), if unit == ScreenUnit::Millimetre { 4 } else { 6 });
-    let free = parameter.held.is_none();
-    let of_free = |text: String| if free { text } else { String::new() };
-    html! {
-        tr class=(if free { "" } else { "held" }) {
-            td { (parameter.parameter) }
-            td { (unit.name()) }
-            td.number { (number(parameter.initial)) }
-            td.number { (of_free(number(parameter.fitted))) }
-            td.number { (of_free(number(parameter.fitted - parameter.initial))) }
-            td.number { (of_free(parameter.std.map_or("undetermined".to_owned(), number))) }
-            td { @if let Some(held) = &parameter.held { (held.to_string()) } }
-        }
-    }
+    let place = |at: &Vector3<f64>| [at.x, at.y, at.z].map(rounded);
+    let point = |row: &RowFact| {
+        let chuck = facts.pairings.get(row.pairing).map_or(0, |pairing| pairing.1);
+        json!([place(&row.sphere_m), chuck, mm_from_m(row.after_m)])
+    };
+    let wires = facts.shells.iter().flat_map(|shell| {
+        let wires = wires_m(facts, shell).into_iter();
+        wires.map(|wire| json!({ "chuck": shell.chuck, "line": wire.iter().map(place).collect::<Vec<_>>() }))
+    });
+    let colours = CHUCKS.map(|(light, dark)| [hex(light), hex(dark)]);
+    let data = json!({
+        "points": facts.rows.iter().map(point).collect::<Vec<_>>(),
+        "chucks": facts.chucks.iter().map(|(name, at)| json!({ "name": name, "at": place(at) })).collect::<Vec<_>>(),
+        "wires": wires.collect::<Vec<_>>(),
+        "colours": colours,
+    });
+    // Inside a script element only `<` could end it.
+    data.to_string().replace('<', "\\u003c")
 }

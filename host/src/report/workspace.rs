@@ -11,7 +11,7 @@ use crate::identify::Fit;
 /// Which slice a point lies in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slice {
-    /// About the plane y = 0, seen from the side: x against z.
+    /// About the plane of the middle y, seen from the side: x against z.
     Side,
     /// About the plane of the middle height, seen from above: x against y.
     Top,
@@ -31,10 +31,14 @@ pub struct WorkspacePoint {
 /// Random joint vectors within the limits, as far as their tools lie in a slice.
 #[derive(Clone, Debug)]
 pub struct Workspace {
-    /// About y = 0.
+    /// About the middle y.
     pub side: Vec<WorkspacePoint>,
     /// About the middle height.
     pub top: Vec<WorkspacePoint>,
+    /// The middle y, metres.
+    pub side_y_m: f64,
+    /// The middle height, metres.
+    pub top_z_m: f64,
 }
 
 const JOINT_VECTORS: usize = 40_000;
@@ -57,7 +61,8 @@ impl Workspace {
             let within = drawn.iter().filter(|(position_m, _)| (position_m[axis] - about_m).abs() <= half_m);
             within.map(|(_, q)| predictor.at(q)).collect()
         };
-        Self { side: slice(1, 0.0), top: slice(2, middle(&drawn, 2)) }
+        let (side_y_m, top_z_m) = (middle(&drawn, 1), middle(&drawn, 2));
+        Self { side: slice(1, side_y_m), top: slice(2, top_z_m), side_y_m, top_z_m }
     }
 
     /// The points of a slice.

@@ -4,22 +4,22 @@ use plotters::prelude::{Color, Rectangle};
 
 use super::canvas::{AFTER, Axis, BEFORE, Labels, WIDTH, chart, draw};
 use super::table::{Table, number};
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, Frame};
 use crate::report::facts::Facts;
 
-const NAME: &str = "correlation";
+const FRAME: Frame = Frame { name: "correlation", title: "Correlation of parameters", wide: true };
 /// Correlations below are not drawn.
 const FAINT: f64 = 0.03;
 const SIZE: u32 = 2 * WIDTH;
 
-pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
+pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let (names, values) = (&facts.correlation.names, &facts.correlation.values);
     let count = names.len();
     if count < 2 {
-        return Ok(None);
+        return Ok(FRAME.missing("Not drawn: it takes two free parameters to be correlated."));
     }
     let numbers: Vec<String> = names.iter().enumerate().map(|(i, _)| (i + 1).to_string()).collect();
-    let svg = draw(NAME, (SIZE, SIZE), |area| {
+    let svg = draw(FRAME.name, (SIZE, SIZE), |area| {
         let range = -0.5..count as f64 - 0.5;
         let x = Axis {
             title: "number of the parameter at the left, from below",
@@ -48,5 +48,5 @@ pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
     let sentence = format!(
         "Strong colour off the diagonal (blue +, orange −) joins parameters that these poses tell together rather than apart.{strongest}"
     );
-    Ok(Some(Figure { name: NAME, title: "Correlation of parameters", sentence, svg, data, wide: true }))
+    Ok(FRAME.drawn(svg, data, sentence))
 }

@@ -4,19 +4,23 @@ use plotters::prelude::{Color, Rectangle};
 
 use super::canvas::{AFTER, Axis, CURVE, HEIGHT, Labels, WIDTH, about_zero, chart, draw, line};
 use super::table::{Table, number};
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, Frame};
 use crate::report::facts::Facts;
 use crate::units::{fixed, mm_from_m};
 
-const NAME: &str = "histogram";
+const FRAME: Frame = Frame { name: "histogram", title: "How the residuals are distributed", wide: false };
 /// Below this probability of so uneven a sample from a normal distribution, it is called not normal.
 const DOUBTFUL: f64 = 0.01;
 
-pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
-    let residuals_mm: Vec<f64> = facts.rows.iter().map(|row| mm_from_m(row.after_m)).collect();
+pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
+    let residuals_mm: Vec<f64> = facts.rows.iter().map(|row| mm_from_m(row.whitened_m)).collect();
     let count = residuals_mm.len() as f64;
     let mean = residuals_mm.iter().sum::<f64>() / count;
     let deviation = (residuals_mm.iter().map(|mm| (mm - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+
+    if !deviation.is_normal() {
+        return Ok(FRAME.missing("Not drawn: the residuals do not scatter."));
+    }
 
     let range = about_zero(residuals_mm.iter().copied());
     let bins = (count.sqrt() as usize).clamp(8, 40);
@@ -30,8 +34,9 @@ pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
     let edge = |bin: usize| range.start + bin as f64 * width;
     let tallest = counts.iter().map(|&n| n as f64).fold(normal(mean).min(count), f64::max) * 1.08;
 
-    let svg = draw(NAME, (WIDTH, HEIGHT), |area| {
-        let x = Axis { title: "residual, mm", range: range.clone(), labels: Labels::Numbers };
+    let title = if facts.is_weighted() { "residual times root of its weight, mm" } else { "residual, mm" };
+    let svg = draw(FRAME.name, (WIDTH, HEIGHT), |area| {
+        let x = Axis { title, range: range.clone(), labels: Labels::Numbers };
         let y = Axis { title: "lengths", range: 0.0..tallest, labels: Labels::Numbers };
         let mut chart = chart(area, "", &x, &y)?;
         let bar =
@@ -45,18 +50,21 @@ pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
         data.row([number(edge(bin)), number(edge(bin + 1)), n.to_string(), number(normal(edge(bin) + width / 2.0))]);
     }
     let test = match facts.normality {
-        None => "too few lengths for a test of normality".to_owned(),
-        Some(test) if test.p_value < DOUBTFUL => {
-            format!(
-                "the Anderson-Darling test speaks against normal noise (p = {:.4}): look for outliers and drift",
-                test.p_value
-            )
-        }
-        Some(test) => format!("the Anderson-Darling test has nothing against normal noise (p = {:.2})", test.p_value),
+        None => "too few for a test of that".to_owned(),
+        Some(test) if test.p_value < DOUBTFUL => format!(
+            "the Anderson-Darling test says they do not (p {}), so look for outliers, drift and what the model does not hold",
+            probability(test.p_value)
+        ),
+        Some(test) => format!("the Anderson-Darling test has nothing against that (p {})", probability(test.p_value)),
     };
     let sentence = format!(
-        "Bars that follow the normal curve (mean {} mm, deviation {deviation:.4} mm) mean noise and no more; {test} (the paper's Fig. 4).",
-        fixed(mean, 4)
+        "Residuals that are noise and no more follow the normal curve (mean {} mm, deviation {} mm); {test} (the paper's Fig. 4).",
+        fixed(mean, 4),
+        fixed(deviation, 4)
     );
-    Ok(Some(Figure { name: NAME, title: "How the residuals are distributed", sentence, svg, data, wide: false }))
+    Ok(FRAME.drawn(svg, data, sentence))
+}
+
+fn probability(p: f64) -> String {
+    if p < 1e-4 { "< 0.0001".to_owned() } else { format!("= {}", fixed(p, if p < DOUBTFUL { 4 } else { 2 })) }
 }

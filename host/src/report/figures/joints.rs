@@ -2,22 +2,22 @@
 
 use super::canvas::{AFTER, Axis, Labels, WIDTH, about_zero, chart, dots, draw};
 use super::table::{Table, number};
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, Frame};
 use crate::report::facts::Facts;
 use crate::units::{ScreenUnit, mm_from_m};
 
-const NAME: &str = "joints";
+const FRAME: Frame = Frame { name: "joints", title: "Residuals by joint", wide: true };
 const COLUMNS: usize = 3;
 const PANEL_HEIGHT: u32 = 420;
 
-pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
+pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let joints = facts.joints.len();
     let lines = joints.div_ceil(COLUMNS);
     let unit = |joint: usize| ScreenUnit::from(facts.joints[joint]);
     let q = |joint: usize, row: usize| unit(joint).from_si(facts.rows[row].q[joint]);
     let residuals_mm: Vec<f64> = facts.rows.iter().map(|row| mm_from_m(row.after_m)).collect();
     let y = Axis { title: "residual, mm", range: about_zero(residuals_mm.iter().copied()), labels: Labels::Numbers };
-    let svg = draw(NAME, (2 * WIDTH, lines as u32 * PANEL_HEIGHT), |area| {
+    let svg = draw(FRAME.name, (2 * WIDTH, lines as u32 * PANEL_HEIGHT), |area| {
         for (joint, panel) in area.split_evenly((lines, COLUMNS)).iter().enumerate().take(joints) {
             let values = (0..residuals_mm.len()).map(|row| q(joint, row));
             let (low, high) = values.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
@@ -36,8 +36,8 @@ pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
         data.rows.push(std::iter::once(row.number.to_string()).chain(values).chain([number(residuals_mm[i])]).collect());
     }
     let sentence =
-        "Even bands: a wave with one joint's angle is an eccentric encoder or a gear, which the model does not hold; a step is \
-                    backlash."
+        "Even bands say that no joint's angle matters; a wave would be an eccentric encoder or gear, which the model does not \
+                    hold, and a step backlash."
             .to_owned();
-    Ok(Some(Figure { name: NAME, title: "Residuals by joint", sentence, svg, data, wide: true }))
+    Ok(FRAME.drawn(svg, data, sentence))
 }

@@ -7,6 +7,7 @@ mod histogram;
 mod joints;
 mod pairings;
 mod proof;
+mod scene;
 mod shell;
 mod singular;
 mod table;
@@ -17,7 +18,8 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use super::facts::Facts;
-pub(super) use canvas::dark_rules;
+pub(super) use canvas::{CHUCKS, dark_rules, hex};
+pub(super) use scene::wires_m;
 pub use table::Table;
 
 /// One figure of the page.
@@ -27,14 +29,40 @@ pub struct Figure {
     pub name: &'static str,
     /// Its heading.
     pub title: &'static str,
-    /// What to see in it.
+    /// What to see in it, or why it is not drawn.
     pub sentence: String,
+    /// Takes the whole width of the page.
+    pub wide: bool,
+    /// None where there is nothing to draw.
+    pub drawing: Option<Drawing>,
+}
+
+/// What is drawn, and from which numbers.
+#[derive(Clone, Debug)]
+pub struct Drawing {
     /// A whole SVG document, which follows the reader's choice of light or dark.
     pub svg: String,
     /// The numbers behind it.
     pub data: Table,
-    /// Takes the whole width of the page.
-    pub wide: bool,
+}
+
+/// Name, heading and width of a figure.
+struct Frame {
+    name: &'static str,
+    title: &'static str,
+    wide: bool,
+}
+
+impl Frame {
+    fn drawn(self, svg: String, data: Table, sentence: String) -> Figure {
+        let Self { name, title, wide } = self;
+        Figure { name, title, sentence, wide, drawing: Some(Drawing { svg, data }) }
+    }
+
+    fn missing(self, why: &str) -> Figure {
+        let Self { name, title, wide } = self;
+        Figure { name, title, sentence: why.to_owned(), wide, drawing: None }
+    }
 }
 
 /// The plotting library could not draw.
@@ -46,23 +74,24 @@ pub struct FigureError {
     reason: String,
 }
 
-/// All figures that these facts allow, in the order of the page.
+/// All figures, in the order of the page; those for which there is nothing to draw say why.
 ///
 /// # Errors
 /// [`FigureError`] when the plotting library refuses.
 pub fn all(facts: &Facts) -> Result<Vec<Figure>, FigureError> {
-    type Draw = fn(&Facts) -> Result<Option<Figure>, FigureError>;
-    let draw: [Draw; 10] = [
+    type Draw = fn(&Facts) -> Result<Figure, FigureError>;
+    let draw: [Draw; 11] = [
         proof::figure,
-        shell::figure,
         histogram::figure,
+        shell::figure,
         singular::figure,
         convergence::figure,
         workspace::figure,
         pairings::figure,
         time::figure,
         joints::figure,
+        scene::figure,
         correlation::figure,
     ];
-    draw.iter().filter_map(|draw| draw(facts).transpose()).collect()
+    draw.iter().map(|draw| draw(facts)).collect()
 }

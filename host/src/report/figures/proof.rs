@@ -2,19 +2,21 @@
 
 use super::canvas::{AFTER, Axis, BEFORE, Failure, HEIGHT, Labels, WIDTH, chart, decades, draw, line, words};
 use super::table::{Table, number};
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, Frame};
 use crate::identify::Residual;
 use crate::report::facts::Facts;
 use crate::units::mm_from_m;
 
-const NAME: &str = "held-out";
+const FRAME: Frame = Frame { name: "held-out", title: "Error on lengths that the fit has not seen", wide: false };
 /// Errors below a tenth of a micrometre are drawn there.
 const SMALLEST_MM: f64 = 1e-4;
 
-pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
-    let Some(proof) = facts.proofs.first() else { return Ok(None) };
+pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
+    let Some(proof) = facts.proofs.first() else {
+        return Ok(FRAME.missing("Not drawn: no lengths were kept from the fit, and there are too few to leave some out in turn. Measure more, or give others with --validate."));
+    };
     let (before_mm, after_mm) = (sorted_mm(&proof.before), sorted_mm(&proof.after));
-    let svg = draw(NAME, (WIDTH, HEIGHT), |area| {
+    let svg = draw(FRAME.name, (WIDTH, HEIGHT), |area| {
         let range = decades(before_mm.iter().chain(&after_mm).copied(), SMALLEST_MM);
         let x = Axis { title: "error of a length, mm", range, labels: Labels::Powers };
         let y = Axis { title: "% of lengths below", range: 0.0..100.0, labels: Labels::Numbers };
@@ -37,7 +39,7 @@ pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
         median(&after_mm),
         median(&before_mm)
     );
-    Ok(Some(Figure { name: NAME, title: "Error on lengths that the fit has not seen", sentence, svg, data, wide: false }))
+    Ok(FRAME.drawn(svg, data, sentence))
 }
 
 fn sorted_mm(residuals: &[Residual]) -> Vec<f64> {

@@ -2,24 +2,24 @@
 
 use super::canvas::{AFTER, Axis, HEIGHT, Labels, WIDTH, about_zero, chart, dots, draw};
 use super::table::{Table, number};
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, Frame};
 use crate::report::facts::{Facts, RowFact};
 use crate::units::mm_from_m;
 
-const NAME: &str = "shell";
+const FRAME: Frame = Frame { name: "shell", title: "Residuals over the shell", wide: true };
 
-pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
+pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let residuals = about_zero(facts.rows.iter().map(|row| mm_from_m(row.after_m)));
     let lowest = facts.rows.iter().map(|row| row.latitude_rad.to_degrees()).fold(0.0, f64::min).floor();
     let y = Axis { title: "residual, mm", range: residuals, labels: Labels::Numbers };
     let longitude = |row: &RowFact| row.longitude_rad.to_degrees();
     let latitude = |row: &RowFact| row.latitude_rad.to_degrees();
-    let svg = draw(NAME, (WIDTH, 2 * HEIGHT - 200), |area| {
-        let (above, below) = area.split_vertically(HEIGHT - 100);
+    let svg = draw(FRAME.name, (2 * WIDTH, HEIGHT), |area| {
+        let panels = area.split_evenly((1, 2));
         let x = Axis { title: "longitude, °", range: 0.0..360.0, labels: Labels::Numbers };
-        dots(&mut chart(&above, "", &x, &y)?, AFTER, facts.rows.iter().map(|row| (longitude(row), mm_from_m(row.after_m))))?;
+        dots(&mut chart(&panels[0], "", &x, &y)?, AFTER, facts.rows.iter().map(|row| (longitude(row), mm_from_m(row.after_m))))?;
         let x = Axis { title: "latitude, °", range: lowest..90.0, labels: Labels::Numbers };
-        dots(&mut chart(&below, "", &x, &y)?, AFTER, facts.rows.iter().map(|row| (latitude(row), mm_from_m(row.after_m))))
+        dots(&mut chart(&panels[1], "", &x, &y)?, AFTER, facts.rows.iter().map(|row| (latitude(row), mm_from_m(row.after_m))))
     })?;
     let mut data = Table::new(["row", "longitude_deg", "latitude_deg", "residual_before_mm", "residual_after_mm"]);
     for row in &facts.rows {
@@ -28,8 +28,8 @@ pub(super) fn figure(facts: &Facts) -> Result<Option<Figure>, FigureError> {
         data.row([row.number.to_string(), longitude, latitude, before, after]);
     }
     let sentence =
-        "An even band about zero wherever the bar points; a wave along either axis is geometry that the model does not \
-                    hold (the paper's Fig. 3)."
+        "Where the bar points makes no difference if both are even bands about zero; a wave along either axis is geometry that \
+                    the model does not hold (the paper's Fig. 3)."
             .to_owned();
-    Ok(Some(Figure { name: NAME, title: "Residuals over the shell", sentence, svg, data, wide: false }))
+    Ok(FRAME.drawn(svg, data, sentence))
 }

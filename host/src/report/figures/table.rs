@@ -11,12 +11,12 @@ pub struct Table {
 
 impl Table {
     /// Without rows.
-    pub(super) fn new<const N: usize>(headings: [&str; N]) -> Self {
+    pub(in crate::report) fn new<const N: usize>(headings: [&str; N]) -> Self {
         Self { headings: headings.map(str::to_owned).to_vec(), rows: Vec::new() }
     }
 
     /// With a row of words and numbers.
-    pub(super) fn row<const N: usize>(&mut self, fields: [String; N]) {
+    pub(in crate::report) fn row<const N: usize>(&mut self, fields: [String; N]) {
         self.rows.push(fields.to_vec());
     }
 

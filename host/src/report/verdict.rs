@@ -1,0 +1,153 @@
+//! The answer of the first screen: what the result is called, with what reserve, and what it does not say.
+
+use super::facts::Facts;
+use crate::units::{fixed, mm_from_m};
+
+/// What the result is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// Lengths left out of the fit are predicted better than by the design, and nothing stands against it.
+    Calibrated,
+    /// The design was at the minimum already.
+    Unchanged,
+    /// Better than the design, but something in the measurements weighs on the numbers.
+    Reserved,
+    /// Not to be used.
+    NotTrusted,
+}
+
+impl Answer {
+    /// For people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Calibrated => "Calibrated",
+            Self::Unchanged => "Nothing to correct",
+            Self::Reserved => "Better than its design, with reservations",
+            Self::NotTrusted => "Not to be trusted as it is",
+        }
+    }
+
+    /// For machines: `calibrated`, `unchanged`, `reserved`, `not_trusted`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Calibrated => "calibrated",
+            Self::Unchanged => "unchanged",
+            Self::Reserved => "reserved",
+            Self::NotTrusted => "not_trusted",
+        }
+    }
+}
+
+/// The answer and its grounds, in whole sentences.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// What the result is called.
+    pub answer: Answer,
+    /// Why not something better; none for [`Answer::Calibrated`].
+    pub reasons: Vec<String>,
+    /// What nobody may conclude from the page.
+    pub not_said: Vec<String>,
+}
+
+/// Neighbours in the order of measurement that are alike beyond this correlation drift together.
+pub(super) const ALIKE: f64 = 0.5;
+/// Lengths left out may be predicted by this factor worse than those fitted before it is said.
+const MUCH_WORSE: f64 = 2.0;
+/// Files of poses end at a nanometre: residuals below a micrometre are of simulations without noise, and compare with nothing.
+const ROUNDING_M: f64 = 1e-6;
+
+impl Verdict {
+    pub(super) fn new(facts: &Facts) -> Self {
+        let against: Vec<String> = against(facts).collect();
+        let reserves = reserves(facts);
+        let (answer, reasons) = if !against.is_empty() {
+            (Answer::NotTrusted, against)
+        } else if facts.is_unchanged {
+            (Answer::Unchanged, reserves)
+        } else if reserves.is_empty() {
+            (Answer::Calibrated, reserves)
+        } else {
+            (Answer::Reserved, reserves)
+        };
+        Self { answer, reasons, not_said: not_said(facts) }
+    }
+}
+
+/// The fit's own objection, and proofs that speak against it.
+fn against(facts: &Facts) -> impl Iterator<Item = String> + '_ {
+    let objection = facts.objection.iter().map(|objection| sentence(objection));
+    let proofs = facts.proofs.iter().filter(|proof| proof.speaks_against());
+    objection.chain(proofs.map(|proof| format!("The design predicts better than the fit on {}.", proof.name)))
+}
+
+fn reserves(facts: &Facts) -> Vec<String> {
+    let mut reserves = Vec::new();
+    let (told, independent) = (facts.told, facts.independent);
+    if told < independent {
+        reserves.push(format!(
+            "These poses tell {told} of the {independent} parameters that lengths can tell of this robot: where the others matter, \
+             the tool may be as wrong as before."
+        ));
+    }
+    match facts.outliers.as_slice() {
+        [] => {}
+        [only] => reserves.push(format!("1 length stands out and weighs on all numbers: {}.", facts.rows[only.row].place)),
+        [worst, ..] => reserves.push(format!(
+            "{} lengths stand out and weigh on all numbers, most of all {}.",
+            facts.outliers.len(),
+            facts.rows[worst.row].place
+        )),
+    }
+    if let Some(correlation) = facts.neighbour_correlation.filter(|&correlation| correlation > ALIKE) {
+        reserves.push(format!(
+            "Residuals follow one another in the order of measurement (correlation {correlation:.2}): something drifts or jumps, such \
+             as the zero of the bar, and all deviations on this page are too small."
+        ));
+    }
+    if let Some(proof) = facts.proofs.first() {
+        let factor = proof.after_summary().rms_m / facts.after.rms_m.max(f64::MIN_POSITIVE);
+        if factor > MUCH_WORSE && proof.after_summary().rms_m > ROUNDING_M && !facts.is_unchanged {
+            reserves.push(format!(
+                "Lengths not seen are predicted {factor:.1} times worse than those fitted: the poses are few or alike for so many \
+                 parameters. Trust the larger number."
+            ));
+        }
+    }
+    reserves
+}
+
+fn not_said(facts: &Facts) -> Vec<String> {
+    let mut not_said = Vec::new();
+    if !facts.proofs.iter().any(|proof| proof.is_apart) {
+        not_said.push(
+            "That other lengths were tried: the proof is by parts of the same poses, left out in turn. Poses of another day or bar \
+             (--validate) are a better one."
+                .to_owned(),
+        );
+    }
+    not_said.push(
+        "That lengths and places are true: an error common to all lengths (the bar's zero and scale) or of the coordinates in the \
+         rig's file goes into the parameters and shows in no residual."
+            .to_owned(),
+    );
+    not_said.push(
+        "How the robot does under another load or temperature, how well it repeats, and for how long the result holds."
+            .to_owned(),
+    );
+    not_said
+}
+
+/// `0.101 ± 0.008 mm`: an RMS and the standard error that so many independent normal residuals give it, `RMS/√(2n)`.
+pub(super) fn rms_text(rms_m: f64, count: usize) -> String {
+    const FEWEST: usize = 8;
+    let rms_mm = mm_from_m(rms_m);
+    let error_mm = rms_mm / (2.0 * count as f64).sqrt();
+    if count < FEWEST { format!("{} mm", fixed(rms_mm, 3)) } else { format!("{} ± {} mm", fixed(rms_mm, 3), fixed(error_mm, 3)) }
+}
+
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    let end = if text.ends_with('.') { "" } else { "." };
+    format!("{first}{}{end}", letters.as_str())
+}
