@@ -13,7 +13,7 @@ use crate::command::host_cal_in;
 use crate::naive;
 
 /// A name that would end a comment, a quoted text, an element or a line wherever it is not written with care.
-pub const HOSTILE_NAME: &str = "*/ --> \" ' <&> \\ ]]> ${x} \u{2028}- a: \u{85}#{ =cmd() %% é";
+pub const HOSTILE_NAME: &str = "*/ --> \" ' <&> \\ ]]> ${x} \u{2028}- a: #{ =cmd() %% é";
 
 /// Writes `calibrated.toml`: a built-in robot as a calibration leaves one, every parameter a little off its design, with a hostile name.
 pub fn write_calibrated(folder: &Path, design: &str) -> Robot {

@@ -4,7 +4,7 @@ use std::fs;
 
 use ballbar_tests::command::{Run, host_cal_in};
 use ballbar_tests::exports::{joint_vectors, pose_by_products, write_calibrated};
-use host_cal::files::{Goal, ROBOTS, Robot, Source, Target, UrdfEnds, parse_urdf, read_targets};
+use host_cal::files::{Goal, JointLimits, ROBOTS, Robot, Source, Target, UrdfEnds, parse_urdf, read_targets};
 use host_cal::kinematics::{Compensation, Compensator, Unreached};
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use tempfile::TempDir;
@@ -21,7 +21,7 @@ fn targets(text: &str, nominal: &Robot) -> Vec<Target> {
 
 /// Commands one after the other, from the middle of the joints' ranges.
 fn commands(real: &Robot, nominal: &Robot, text: &str) -> Vec<Result<Compensation, Unreached>> {
-    let compensator = Compensator::new(real, nominal);
+    let compensator = Compensator::new(real, nominal).expect("limits in common");
     let mut before = compensator.middle();
     let mut command = |target: &Target| {
         let found = compensator.compensate(&target.goal, &before, |q| q);
@@ -90,7 +90,7 @@ fn a_controller_that_takes_poses_gets_one_that_its_own_inverse_turns_into_the_co
     let q = "10,-70,80,-30,60,200";
     let found = commands(&real, &nominal, &format!("{JOINTS}{q}\n"))[0].unwrap();
     // The controller: its model's inverse, near where it would have been.
-    let controller = Compensator::new(&nominal, &nominal);
+    let controller = Compensator::new(&nominal, &nominal).expect("limits in common");
     let goal = Goal::Pose(found.nominal_base_from_tool, Some(found.nominal_q));
     let theirs = controller.compensate(&goal, &found.nominal_q, |q| q).unwrap();
     let off = theirs.q.as_array().iter().zip(found.q.as_array()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -164,6 +164,52 @@ fn an_arm_shorter_than_its_design_does_not_reach_as_far() {
     let found = commands(&shorter, &nominal, &stretched);
     assert_eq!(found[0], Err(Unreached::ByCalibrated));
     assert!(found[1].is_ok(), "{found:?}");
+}
+
+/// Of a calibrated puma560, the third joint's limits as degrees in its file.
+fn with_third_joint(folder: &TempDir, min_deg: &str, max_deg: &str) {
+    write_calibrated(folder.path(), "puma560");
+    let path = folder.path().join("calibrated.toml");
+    let text = fs::read_to_string(&path).expect("a file");
+    let narrowed = text.replacen("min_deg = -45.0", &format!("min_deg = {min_deg}"), 1);
+    let narrowed = narrowed.replacen("max_deg = 225.0", &format!("max_deg = {max_deg}"), 1);
+    assert!(Robot::parse(&Source::new("narrowed", &narrowed)).expect("a robot").limits[2].min.to_degrees() > -40.0, "{text}");
+    fs::write(&path, narrowed).expect("a file");
+}
+
+#[test]
+fn branches_are_looked_for_within_what_both_robots_allow() {
+    let folder = TempDir::new().expect("a temporary folder");
+    with_third_joint(&folder, "60.0", "225.0");
+    // From a posture with the elbow the way that only the nominal robot may have it.
+    let start = "--start=0,-120,-30,0,60,0";
+    let run = run(&folder, &format!("{POSE}500,150,600,0,90,0\n400,250,500,0,90,0\n"), &[start, "--json"]);
+    assert_eq!(run.code, 0, "{}", run.transcript());
+    for command in run.json()["commands"].as_array().expect("commands") {
+        assert!((60.0..=225.0).contains(&command["q"][2].as_f64().expect("a number")), "{command}");
+    }
+}
+
+#[test]
+fn robots_that_allow_nothing_in_common_are_refused_by_the_joint() {
+    let folder = TempDir::new().expect("a temporary folder");
+    with_third_joint(&folder, "226.0", "230.0");
+    let run = run(&folder, &format!("{JOINTS}10,-40,160,20,-50,50\n"), &[]);
+    assert_eq!(run.code, 2, "{}", run.transcript());
+    assert!(
+        run.stderr.contains("joint 3: the calibrated robot allows 226 to 230 deg, the nominal one -45 to 225 deg"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
+fn a_joint_that_can_hardly_move_is_no_trouble() {
+    let mut robot = Robot::open("ur5e").expect("a built-in robot");
+    let min = 10.0_f64.to_radians();
+    robot.limits[2] = JointLimits { min, max: min.next_up() };
+    let found = commands(&robot, &robot, &format!("{POSE}500,150,600,0,90,0\n"))[0];
+    assert!(found.is_err_and(|why| why == Unreached::ByNominal), "{found:?}");
 }
 
 fn run(folder: &TempDir, text: &str, more: &[&str]) -> Run {

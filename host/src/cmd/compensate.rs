@@ -89,7 +89,7 @@ impl CompensateArgs {
         if robot.chain.joint_kinds() != nominal.chain.joint_kinds() {
             return Err(DifferentJoints(self.robot.clone(), self.nominal.clone()).into());
         }
-        let compensator = Compensator::new(&robot, &nominal);
+        let compensator = Compensator::new(&robot, &nominal)?;
         let start = self.start(&nominal, &compensator)?;
         let targets = read_targets(&Source::read(&self.targets)?, &nominal)?;
         let (done, not_reached) = compensated(&robot, &compensator, &targets, start);

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use ballbar::{Joint, JointKind, Link, Vector3};
 
 use super::{JointZero, origin};
-use crate::files::{ENCODER_ELEMENT, JointLimits, Robot};
+use crate::files::{ENCODER_ELEMENT, JointLimits, MOST_NAME_BYTES, Robot};
 use crate::kinematics::{compose, from_link, link_angles};
 
 /// The robot as a URDF.
@@ -18,7 +18,7 @@ pub(super) fn text(robot: &Robot, zero: JointZero) -> String {
     // A comment may not hold two hyphens.
     let _ = writeln!(text, "<!-- {} -->", origin(robot).replace("--", "__"));
     let _ = writeln!(text, "<!-- A joint's value is offset + scale * encoder output; see {ENCODER_ELEMENT}. -->");
-    let _ = writeln!(text, "<robot name=\"{}\">", attribute(&robot.name));
+    let _ = writeln!(text, "<robot name=\"{}\">", escaped(urdf_name(&cleaned(&robot.name))));
     let joints = robot.chain.joints();
     for link in 0..=joints + 1 {
         let _ = writeln!(text, "  <link name=\"{}\"/>", link_name(link, joints));
@@ -70,6 +70,10 @@ pub(super) fn remarks(robot: &Robot, zero: JointZero) -> Vec<String> {
         .collect();
     let mut remarks =
         vec!["effort and velocity limits are not known here and stand as 0: set them before a planner reads them".to_owned()];
+    let name = cleaned(&robot.name);
+    if urdf_name(&name) != name {
+        remarks.push(format!("the robot's name is longer than the {MOST_NAME_BYTES} bytes that `import` takes, and cut there"));
+    }
     if !moved.is_empty() {
         let (holds_no, value) = match zero {
             JointZero::Model => ("offset and scale: they are", "offset + scale * encoder output"),
@@ -117,16 +121,25 @@ fn link_name(link: usize, joints: usize) -> String {
     }
 }
 
-/// A text as an XML attribute; what XML cannot hold becomes `_`, and what is longer than a reader takes is cut. Whatever a parser of YAML
-/// might take for the end of a line is written by its number.
-fn attribute(text: &str) -> String {
-    let text = if text.trim().is_empty() { "robot" } else { text };
-    let escaped = text.chars().take(40).map(|c| match c {
+/// A name with `_` for what XML cannot hold, and for `$`, with which xacro begins what it computes.
+fn cleaned(name: &str) -> String {
+    let is_replaced = |c: char| c.is_control() || matches!(c, '$' | '\u{fffe}' | '\u{ffff}');
+    let cleaned: String = name.chars().map(|c| if is_replaced(c) { '_' } else { c }).collect();
+    if cleaned.trim().is_empty() { "robot".to_owned() } else { cleaned }
+}
+
+/// As much of a name as a reader takes.
+fn urdf_name(name: &str) -> &str {
+    &name[..name.floor_char_boundary(MOST_NAME_BYTES)]
+}
+
+/// A text as an XML attribute. Whatever a parser of YAML might take for the end of a line is written by its number.
+fn escaped(text: &str) -> String {
+    let escaped = text.chars().map(|c| match c {
         '&' => "&amp;".to_owned(),
         '<' => "&lt;".to_owned(),
         '>' => "&gt;".to_owned(),
         '"' => "&quot;".to_owned(),
-        c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => "_".to_owned(),
         c if c.is_ascii() || c.is_alphanumeric() => c.to_string(),
         c => format!("&#x{:x};", u32::from(c)),
     });

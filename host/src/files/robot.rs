@@ -18,6 +18,9 @@ use super::problem::Problem;
 use super::source::{InputError, Source};
 use crate::units::{ScreenUnit, m_from_mm, tidy};
 
+/// A robot's name is not longer: it goes to screens and into the files of others.
+pub const MOST_NAME_BYTES: usize = 200;
+
 /// A robot as its file describes it.
 #[derive(Clone, Debug)]
 pub struct Robot {

@@ -46,8 +46,13 @@ pub struct Branches {
 impl InverseKinematics {
     /// Prepares a robot.
     pub fn new(robot: &Robot) -> Self {
+        Self::within(robot, robot.limits.clone())
+    }
+
+    /// Prepares a robot with other limits than its file's.
+    pub fn within(robot: &Robot, limits: Vec<JointLimits>) -> Self {
         let skeleton = Skeleton::new(&robot.chain);
-        Self { closed: Opw::recognise(&skeleton), limits: robot.limits.clone(), skeleton }
+        Self { closed: Opw::recognise(&skeleton), limits, skeleton }
     }
 
     /// Whether branches come from a closed form and are therefore all.
@@ -110,7 +115,7 @@ impl InverseKinematics {
             if encoder.kind == JointKind::Revolute {
                 half = half.min(TAU / 2.0 / encoder.scale.abs());
             }
-            *value = rng.random_range(middle - half..middle + half);
+            *value = rng.random_range(middle - half..=middle + half);
         }
         q
     }

@@ -3,8 +3,10 @@
 use std::fmt;
 
 use ballbar::{JointKind, JointVector, Kinematics, Pose};
+use miette::Diagnostic;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
 
 use super::branches::{InverseKinematics, Thoroughness};
 use super::frames::apart;
@@ -35,6 +37,27 @@ pub struct Compensation {
     pub before: (f64, f64),
     /// From the target, if it goes to `q`.
     pub left: (f64, f64),
+}
+
+/// A joint of which the two robots allow nothing in common.
+#[derive(Clone, Copy, Debug, PartialEq, Error, Diagnostic)]
+#[error("joint {joint}: the calibrated robot allows {}, the nominal one {}", range(*.kind, .calibrated), range(*.kind, .nominal))]
+#[diagnostic(help("A command has to be within the limits of both: give one of the files the joint's true limits."))]
+pub struct NothingAllowed {
+    /// Number of the joint, from 1.
+    pub joint: usize,
+    /// Its kind.
+    pub kind: JointKind,
+    /// Its limits in the calibrated robot's file.
+    pub calibrated: JointLimits,
+    /// Its limits in the nominal robot's file.
+    pub nominal: JointLimits,
+}
+
+fn range(kind: JointKind, limits: &JointLimits) -> String {
+    let unit = ScreenUnit::from(kind);
+    let [min, max] = [limits.min, limits.max].map(|value| tidy(unit.from_si(value)));
+    format!("{min} to {max} {}", unit.name())
 }
 
 /// Why a target has no command.
@@ -72,16 +95,27 @@ impl fmt::Display for Unreached {
 }
 
 impl Compensator {
-    /// A calibrated robot and its controller's model; both have the same joints.
-    pub fn new(calibrated: &Robot, nominal: &Robot) -> Self {
-        let both = calibrated.limits.iter().zip(&nominal.limits);
-        Self {
-            calibrated: InverseKinematics::new(calibrated),
-            nominal: InverseKinematics::new(nominal),
-            nominal_forward: Kinematics::new(&nominal.chain),
-            kinds: nominal.chain.joint_kinds().to_vec(),
-            limits: both.map(|(a, b)| JointLimits { min: a.min.max(b.min), max: a.max.min(b.max) }).collect(),
+    /// A calibrated robot and its controller's model; both have the same joints. Branches are looked for within what both allow.
+    ///
+    /// # Errors
+    /// [`NothingAllowed`] names the first joint of which they allow nothing in common.
+    pub fn new(calibrated: &Robot, nominal: &Robot) -> Result<Self, NothingAllowed> {
+        let kinds = nominal.chain.joint_kinds().to_vec();
+        let mut limits = Vec::new();
+        for (i, ((a, b), &kind)) in calibrated.limits.iter().zip(&nominal.limits).zip(&kinds).enumerate() {
+            let both = JointLimits { min: a.min.max(b.min), max: a.max.min(b.max) };
+            if both.min > both.max {
+                return Err(NothingAllowed { joint: i + 1, kind, calibrated: *a, nominal: *b });
+            }
+            limits.push(both);
         }
+        Ok(Self {
+            calibrated: InverseKinematics::within(calibrated, limits.clone()),
+            nominal: InverseKinematics::within(nominal, limits.clone()),
+            nominal_forward: Kinematics::new(&nominal.chain),
+            kinds,
+            limits,
+        })
     }
 
     /// The middle of the joints' ranges.

@@ -7,6 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::super::numbers::Range as Of;
 use super::super::problem::Problem;
+use super::super::robot::MOST_NAME_BYTES;
 use super::super::source::{InputError, Source};
 use super::ENCODER_ELEMENT;
 use crate::kinematics::from_link;
@@ -50,9 +51,6 @@ pub(super) struct EncoderModel {
     pub(super) offset: f64,
     pub(super) scale: f64,
 }
-
-/// Longer names are refused.
-const LONGEST_NAME: usize = 200;
 
 /// A text cut to what a message can show.
 pub(super) fn short(text: &str) -> String {
@@ -210,7 +208,7 @@ fn attribute<'a>(source: &Source, node: Node<'a, 'a>, name: &str, tag: &str) -> 
     let Some(value) = node.attribute(name) else {
         return Err(refuse(source, node, &what, "missing".into(), "a name"));
     };
-    if value.is_empty() || value.len() > LONGEST_NAME || value.chars().any(char::is_control) {
+    if value.is_empty() || value.len() > MOST_NAME_BYTES || value.chars().any(char::is_control) {
         let found = format!("`{}`, {} bytes long", short(value), value.len());
         return Err(refuse(source, node, &what, found, "a name of 1 to 200 bytes without control characters"));
     }
