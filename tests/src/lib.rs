@@ -27,3 +27,4 @@ pub mod solids;
 #[cfg(unix)]
 pub mod terminal;
 pub mod wire_schema;
+pub mod workspace;

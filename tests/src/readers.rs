@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::workspace::{target_folder, workspace};
+
 /// Set by `check` when it could not install the programs, and said so.
 const WITHOUT_READERS: &str = "BALLBAR_WITHOUT_READERS";
 
@@ -20,8 +22,7 @@ pub fn is_skipped() -> bool {
 /// # Panics
 /// When the script fails, or `check` never ran here.
 pub fn python(script: &str, arguments: &[&Path]) -> String {
-    let environment = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
-    let python = environment.join("readers/bin/python");
+    let python = target_folder().join("readers/bin/python");
     output(Command::new(python).arg(reader(script)).args(arguments))
 }
 
@@ -47,8 +48,4 @@ pub fn output(command: &mut Command) -> String {
     let words = String::from_utf8_lossy(&run.stderr);
     assert!(run.status.success(), "{command:?}: {}\n{words}", run.status);
     String::from_utf8(run.stdout).unwrap_or_else(|error| panic!("{command:?}: {error}"))
-}
-
-fn workspace() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }

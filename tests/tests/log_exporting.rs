@@ -83,13 +83,18 @@ impl Log {
         host_cal_in(self.path(), args)
     }
 
-    /// Exports to all formats; what the readers found in them.
+    /// Exports a whole log to all formats; what the readers found in them.
     fn read_back(&self) -> Value {
+        self.read_back_after(0).1
+    }
+
+    /// Exports to all formats, with this exit code; what was said, and what the readers found in the files.
+    fn read_back_after(&self, code: i32) -> (Run, Value) {
         let run = self.export(&[&ALL[..], &["--mcap", "s.mcap"]].concat());
-        assert_eq!(run.code, 0, "{}", run.transcript());
+        assert_eq!(run.code, code, "{}", run.transcript());
         let read = read_back(self.path());
         assert_eq!(read["row_count"], run.json()["samples"]);
-        read
+        (run, read)
     }
 }
 
@@ -169,6 +174,7 @@ fn parameters_that_come_later_give_columns_to_the_whole_table() {
     let q = sliding.q([1_000.0, -20_000.0, 300_000.0, -4.0]);
     assert_eq!(field(3, "q2_mm"), format!("{:.9}", q.as_array()[1] * 1e3));
     assert_eq!((field(3, "q2_deg"), field(3, "counts5"), field(3, "displacement_mm")), ("", "", ""), "a smaller board, a fault");
+    assert_eq!((field(3, "q4_deg").is_empty(), field(3, "q5_deg")), (false, ""), "a joint without an encoder in its row");
     assert_eq!(field(3, "saturated"), "1");
 }
 
@@ -206,8 +212,11 @@ fn settled_poses_tool_poses_and_losses_are_messages_with_the_boards_time() {
     torn.push(0);
     log.writer.frame(&torn).expect("it is written");
     log.put(&ToHost::Mark(LogMark::Lost { unix_ms: 1_700_000_009_000 }));
-    let read = log.read_back();
+    let (run, read) = log.read_back_after(1);
 
+    let told = run.json();
+    assert_eq!((&told["damaged"], &told["gaps"], &told["losses"]["missing"]), (&1.into(), &1.into(), &3.into()));
+    assert!(run.stderr.contains("warning: MISSING: 3 messages"), "{}", run.stderr);
     assert_eq!(read["row_count"], 0, "a table of no rows is read as well");
     let found = &read["settled"][0];
     assert_eq!(found["unix_us"], 1_700_000_001_123_000_i64, "one second after the hello");
@@ -276,7 +285,7 @@ fn a_long_log_goes_to_several_row_groups_and_a_cut_one_to_as_much_as_is_whole() 
 }
 
 #[test]
-fn all_files_are_written_or_none() {
+fn an_export_that_is_refused_changes_nothing() {
     let mut log = Log::new();
     log.hello(0).parameters(&set_of("puma560"));
     for index in 0..2_000 {
@@ -293,15 +302,97 @@ fn all_files_are_written_or_none() {
         (3, ["--csv", "a.csv", "--mcap", "absent/a.mcap"], "absent/a.mcap: cannot be written"),
         (3, ["--parquet", "s", "--csv", "a.csv"], "s: cannot be written: it is there, but is no regular file"),
         (2, ["--csv", "a", "--parquet", "a"], "a: is named twice, as an output and as another output"),
+        (2, ["--csv", "./new", "--parquet", "s/../new"], "s/../new: is named twice, as an output and as another output"),
         (2, ["--csv", "s/stream.bbl", "--mcap", "a"], "s/stream.bbl: is named twice, as an output and as the log"),
+        (2, ["--csv", "s/poses.csv", "--mcap", "a"], "s/poses.csv: is named twice, as an output and as a file of the session"),
+        (3, ["--csv", "a.csv", "--mcap", "new/"], "new/: cannot be written: this is a folder's name, not a file's"),
+        (3, ["--csv", "a.csv", "--mcap", &"n".repeat(300)], "File name too long"),
     ] {
+        fs::write(log.path().join("a.csv"), "older").expect("an older file");
         let run = log.export(&[&["log", "export", "s"][..], &args].concat());
         assert!(run.code == code && run.stderr.contains(message), "{args:?}: {}", run.transcript());
-        assert_eq!(names(), ["s"], "{args:?}");
+        assert_eq!(names(), ["a.csv", "s"], "{args:?}");
+        assert_eq!(fs::read_to_string(log.path().join("a.csv")).expect("the older file"), "older", "{args:?}");
     }
     let none = log.export(&["log", "export", "s"]);
     assert!(none.code == 2 && none.stderr.contains("<--csv <FILE>|--parquet <FILE>|--mcap <FILE>>"), "{}", none.stderr);
     assert_eq!(fs::read(log.path().join("s/stream.bbl")).expect("the log"), before);
+}
+
+#[test]
+fn a_damaged_mark_takes_the_segments_time_and_nothing_else_is_taken_for_it() {
+    if readers::is_skipped() {
+        return;
+    }
+    let mut log = Log::new();
+    log.hello(0).parameters(&set_of("puma560")).sample(&sample(1_000, &COUNTS, 30_000));
+    log.writer.frame(&[&[9; 40][..], &[0]].concat()).expect("it is written");
+    // Another start of the board: its numbers and its clock begin anew, and it has not said which parameters it uses.
+    log.sequence = 0;
+    log.hello(0).sample(&sample(5, &COUNTS, 30_000));
+    let path = log.path().join("s/stream.bbl");
+    let mut bytes = fs::read(&path).expect("the log");
+    let (run, read) = log.read_back_after(1);
+    assert_eq!((&run.json()["damaged"], &run.json()["losses"]["missing"]), (&1.into(), &0.into()));
+    let [first, second] = [0, 1].map(|row| &read["rows"][row]);
+    assert!(first["unix_us"].is_i64() && first["q1_deg"].is_f64(), "{first}");
+    assert!(second["segment"] == 2 && second["unix_us"].is_null() && second["q1_deg"].is_null(), "{second}");
+    assert!(read["log"].as_array().expect("a list").contains(&"segment 2: its mark is damaged, its time unknown".into()));
+
+    // Now the first mark, behind the header's fifteen bytes, as well: there is no mark left to tell any time.
+    bytes[17] ^= 0x40;
+    fs::write(&path, &bytes).expect("the log");
+    log.reopen();
+    let (_, read) = log.read_back_after(1);
+    assert_eq!(read["segments"], serde_json::json!([1, 2]));
+    assert!(read["rows"][0]["unix_us"].is_null(), "and the times of messages are near the mark of the last run");
+}
+
+#[test]
+fn ctrl_c_ends_an_export_and_leaves_nothing() {
+    let mut log = Log::new();
+    log.hello(0).parameters(&set_of("puma560"));
+    for index in 0..150_000 {
+        log.sample(&sample(index, &COUNTS.map(|counts| counts.wrapping_mul(index as i32)), index as u16));
+    }
+    let args = ["log", "export", "s", "--csv", "a.csv", "--parquet", "a.parquet", "--mcap", "a.mcap"];
+    let mut child = host_cal_command(log.path(), &args).stderr(std::process::Stdio::piped()).spawn().expect("host-cal starts");
+    let files = || fs::read_dir(log.path()).expect("the folder").count();
+    while files() < 4 {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended before it began to write");
+    }
+    let status = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(status.expect("there is a kill").success());
+    let run = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.code() == Some(130) && said.contains("Nothing was written."), "{}: {said}", run.status);
+    assert_eq!(files(), 1, "of temporary files none is left");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_older_files_permissions_and_links_are_kept() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let mut log = Log::new();
+    log.hello(0).sample(&sample(1, &COUNTS, 30_000));
+    let [csv, link] = ["a.csv", "link.csv"].map(|name| log.path().join(name));
+    fs::write(&csv, "older").expect("an older file");
+    symlink("a.csv", &link).expect("a link");
+    let to_mode = |mode| fs::set_permissions(&csv, PermissionsExt::from_mode(mode)).expect("its permissions");
+    let export = || log.export(&["log", "export", "s", "--csv", "link.csv"]);
+
+    to_mode(0o444);
+    let refused = export();
+    assert!(refused.code == 3 && refused.stderr.contains("link.csv: cannot be written: it is there, and read-only"));
+    to_mode(0o600);
+    assert_eq!(export().code, 0);
+    assert_eq!(fs::metadata(&csv).expect("the file").permissions().mode() & 0o777, 0o600);
+    assert!(link.is_symlink() && fs::read_to_string(&csv).expect("the table").starts_with("segment,"));
+
+    fs::remove_file(&csv).expect("the file");
+    let dangling = export();
+    assert!(dangling.code == 3 && dangling.stderr.contains("it is a link to what is not there"), "{}", dangling.transcript());
+    assert!(link.is_symlink() && !csv.exists());
 }
 
 /// As on a disk that is full, by the limit on the size of files.

@@ -6,8 +6,10 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::inputs::OutputArgs;
-use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print};
+use super::outcome::{CommandError, INTERRUPTED, Outcome};
+use super::port::EndRequest;
+use super::report::{Report, print, warn};
+use crate::board::StreamLosses;
 use crate::session::{LogExportError, LogFormat, LogReader, LogSummary, export_log};
 
 /// Check or export the log of a session (stream.bbl)
@@ -29,7 +31,7 @@ enum LogCommand {
     },
     /// Write what a log holds for other programs: a table of its samples, or everything as timed messages
     #[command(
-        after_help = "Examples:\n  host-cal log export today --csv today.csv\n  host-cal log export today --parquet today.parquet --mcap today.mcap\n\nCSV and Parquet hold every sample as a row, for pandas, DuckDB and others. MCAP holds samples, settled poses, tool poses\nand what happened, for Foxglove. All files are written, or none."
+        after_help = "Examples:\n  host-cal log export today --csv today.csv\n  host-cal log export today --parquet today.parquet --mcap today.mcap\n\nCSV and Parquet hold every sample as a row, for pandas, DuckDB and others. MCAP holds samples, settled poses, tool poses and what happened, for Foxglove. Files are put in place when all have been written.\n\nExit code 1 when something of the log is missing or damaged, 130 at Ctrl-C."
     )]
     Export {
         /// A session's directory, or its stream.bbl
@@ -74,6 +76,9 @@ struct ExportReport<'a> {
     samples: u64,
     settled: u64,
     tool_poses: u64,
+    damaged: u64,
+    gaps: u64,
+    losses: StreamLosses,
 }
 
 impl LogArgs {
@@ -90,19 +95,35 @@ fn check(session: &Path, json: bool) -> Result<Outcome, CommandError> {
     let summary = LogSummary::read(&mut reader)?;
     let report = CheckReport { log: reader.path().display().to_string(), summary };
     print(&report, json)?;
-    Ok(if report.is_whole() { Outcome::Good } else { Outcome::Doubtful })
+    Ok(outcome(&report.summary))
 }
 
 fn export(session: &Path, files: &ExportFiles, json: bool) -> Result<Outcome, CommandError> {
     let log = LogReader::open(session)?.path().display().to_string();
-    let exported = export_log(session, &files.named()).map_err(|error| match error {
+    let end = EndRequest::listen();
+    let summary = export_log(session, &files.named(), &|| end.is_made()).map_err(|error| match error {
         LogExportError::Write(error) => CommandError::output(error),
+        LogExportError::Interrupted => CommandError { exit_code: INTERRUPTED, ..error.into() },
         LogExportError::Log(_) | LogExportError::SameFile { .. } => error.into(),
     })?;
-    let report =
-        ExportReport { log, files, samples: exported.samples, settled: exported.settled, tool_poses: exported.tool_poses };
-    print(&report, json)?;
-    Ok(Outcome::Good)
+    let LogSummary { samples, settled, poses: tool_poses, damaged, gaps, losses, .. } = summary;
+    print(&ExportReport { log, files, samples, settled, tool_poses, damaged, gaps, losses }, json)?;
+    if !summary.is_whole() {
+        warn(&missing(&summary));
+    }
+    Ok(outcome(&summary))
+}
+
+fn outcome(summary: &LogSummary) -> Outcome {
+    if summary.is_whole() { Outcome::Good } else { Outcome::Doubtful }
+}
+
+/// What a log lacks, in words.
+fn missing(LogSummary { damaged, gaps, losses, .. }: &LogSummary) -> String {
+    let StreamLosses { missing, dropped_by_board, lost_on_line, overruns, .. } = losses;
+    format!(
+        "MISSING: {missing} messages ({dropped_by_board} dropped by the board, {lost_on_line} lost on the line), {overruns} samples by overrun; {damaged} damaged frames, {gaps} times without a port"
+    )
 }
 
 impl ExportFiles {
@@ -113,17 +134,9 @@ impl ExportFiles {
     }
 }
 
-impl CheckReport {
-    fn is_whole(&self) -> bool {
-        let LogSummary { damaged, gaps, losses, .. } = self.summary;
-        damaged + gaps + losses.missing + losses.overruns == 0
-    }
-}
-
 impl Report for CheckReport {
     fn text(&self) -> String {
-        let LogSummary { frames, damaged, unfinished_bytes, runs, gaps, samples, settled, poses, duration_s, losses } =
-            &self.summary;
+        let LogSummary { frames, unfinished_bytes, runs, samples, settled, poses, duration_s, .. } = &self.summary;
         let mut text = format!(
             "{}: {frames} whole frames in {runs} runs, {duration_s:.1} s\n{samples} samples, {settled} settled poses, {poses} tool poses\n",
             self.log
@@ -131,14 +144,8 @@ impl Report for CheckReport {
         if *unfinished_bytes > 0 {
             text += &format!("the last frame is cut off after {unfinished_bytes} bytes: the program was ended while it wrote\n");
         }
-        if self.is_whole() {
-            return text + "nothing is missing\n";
-        }
-        text += &format!(
-            "MISSING: {} messages ({} dropped by the board, {} lost on the line), {} samples by overrun; {damaged} damaged frames, {gaps} times without a port\n",
-            losses.missing, losses.dropped_by_board, losses.lost_on_line, losses.overruns
-        );
-        text
+        let rest = if self.summary.is_whole() { "nothing is missing".to_owned() } else { missing(&self.summary) };
+        text + &rest + "\n"
     }
 }
 

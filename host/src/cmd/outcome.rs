@@ -4,6 +4,9 @@ use std::process::ExitCode;
 
 use miette::{Diagnostic, Report};
 
+/// Exit code of a command that Ctrl-C or a signal ended before it had done anything: what shells expect.
+pub(super) const INTERRUPTED: u8 = 130;
+
 /// How a command that ran to its end ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -27,7 +30,7 @@ impl From<Outcome> for ExitCode {
 pub struct CommandError {
     /// What to show.
     pub report: Report,
-    /// 2 for bad input or usage, 3 for output that could not be written.
+    /// 2 for bad input or usage, 3 for output that could not be written, 130 for the user's wish to end.
     pub exit_code: u8,
 }
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use ballbar::StillnessCriteria;
 use clap::Args;
 
-use super::outcome::CommandError;
+use super::outcome::{CommandError, INTERRUPTED};
 use super::screen::give_back;
 use crate::board::{BAUD, BoardLink};
 
@@ -77,7 +77,7 @@ impl EndRequest {
         self.make();
         if self.is_insisted.swap(true, Ordering::Relaxed) {
             give_back();
-            std::process::exit(130);
+            std::process::exit(INTERRUPTED.into());
         }
     }
 

@@ -9,12 +9,9 @@ use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use ballbar::wire::{Event, FrameReader, LogMark, MAX_FRAME, PROTOCOL, ProtocolVersion, ToHost, decode, encode};
+use ballbar::wire::{FrameReader, LogMark, MAX_FRAME, PROTOCOL, ProtocolVersion, ToHost, decode, encode};
 use miette::Diagnostic;
-use serde::Serialize;
 use thiserror::Error;
-
-use crate::board::{StreamLosses, StreamTally};
 
 /// Why a log cannot be read or written.
 #[derive(Debug, Error, Diagnostic)]
@@ -207,85 +204,4 @@ fn check_header(file: &mut impl Read, path: &Path) -> Result<(), LogError> {
         return Err(LogError::OtherVersion { path: path.to_owned(), found });
     }
     Ok(())
-}
-
-/// What a log holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct LogSummary {
-    /// Whole frames.
-    pub frames: u64,
-    /// Torn or damaged ones.
-    pub damaged: u64,
-    /// Bytes of a frame that the end of the file cuts off.
-    pub unfinished_bytes: usize,
-    /// Times that a program began to record.
-    pub runs: u64,
-    /// Times that the port was lost.
-    pub gaps: u64,
-    /// Samples.
-    pub samples: u64,
-    /// Settled poses.
-    pub settled: u64,
-    /// Corrected tool poses.
-    pub poses: u64,
-    /// Time from the first sample, settled pose or tool pose to the last, by the board's clock, seconds; gaps not counted.
-    pub duration_s: f64,
-    /// What was lost on the way.
-    pub losses: StreamLosses,
-}
-
-impl LogSummary {
-    /// Reads a log to its end.
-    ///
-    /// # Errors
-    /// [`LogError`].
-    pub fn read(reader: &mut LogReader) -> Result<Self, LogError> {
-        let mut summary = Self::default();
-        let mut tally = StreamTally::default();
-        let mut last_us: Option<u64> = None;
-        while let Some(record) = reader.next_record()? {
-            let Record::Message(message) = record else {
-                summary.damaged += 1;
-                continue;
-            };
-            summary.frames += 1;
-            match *message {
-                ToHost::Mark(mark) => {
-                    tally.interrupt();
-                    last_us = None;
-                    summary.runs += u64::from(matches!(mark, LogMark::Opened { .. }));
-                    summary.gaps += u64::from(matches!(mark, LogMark::Lost { .. }));
-                }
-                ToHost::Stream(stream) => {
-                    tally.take(&stream);
-                    let now_us = summary.count(&stream.event);
-                    let step_us = last_us.map_or(0, |last| now_us.saturating_sub(last));
-                    summary.duration_s += step_us as f64 * 1e-6;
-                    last_us = Some(now_us.max(last_us.unwrap_or(0)));
-                }
-                ToHost::Hello(_) | ToHost::Reply(_) => {}
-            }
-        }
-        summary.unfinished_bytes = reader.unfinished_bytes();
-        summary.losses = tally.losses();
-        Ok(summary)
-    }
-
-    /// Counts what an event holds; returns its last time, microseconds.
-    fn count(&mut self, event: &Event) -> u64 {
-        match event {
-            Event::Samples(batch) => {
-                self.samples += batch.len() as u64;
-                batch.rest.iter().fold(batch.first.t_us, |t_us, step| t_us.wrapping_add(u64::from(step.dt_us)))
-            }
-            Event::Settled(pose) => {
-                self.settled += 1;
-                pose.t_us.wrapping_add(u64::from(pose.duration_us))
-            }
-            Event::Poses(batch) => {
-                self.poses += batch.poses.len() as u64;
-                batch.t_us + batch.poses.last().map_or(0, |pose| u64::from(pose.dt_us))
-            }
-        }
-    }
 }

@@ -12,12 +12,15 @@ mod export;
 mod log;
 mod pose_file;
 mod recorder;
+mod segments;
+mod summary;
 
 pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
-pub use export::{Exported, LogExportError, LogFormat, export_log};
-pub use log::{LogError, LogReader, LogSummary, LogWriter, Record};
+pub use export::{LogExportError, LogFormat, export_log};
+pub use log::{LogError, LogReader, LogWriter, Record};
 pub use pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 pub use recorder::{Connection, MeasuredPose, RecordError, Recorder};
+pub use summary::LogSummary;
 
 /// Name of the log in a session.
 pub const LOG_NAME: &str = "stream.bbl";

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use crate::workspace::target_folder;
+
 /// The boards' target: Cortex-M4F, hard float.
 const TARGET: &str = "thumbv7em-none-eabihf";
 /// Set by `check` when it could not install the target or QEMU, and said so.
@@ -52,7 +54,8 @@ fn build(bin: &str, feature: &str) -> PathBuf {
         .features(feature)
         .release()
         .target(TARGET)
-        .target_dir(target_folder())
+        // A folder of its own: cargo, which runs this test, may hold the lock of the other.
+        .target_dir(target_folder().join("board"))
         .arg("--locked")
         .run();
     match run {
@@ -62,11 +65,4 @@ fn build(bin: &str, feature: &str) -> PathBuf {
              cannot be had, {WITHOUT_BOARD}=1 skips these tests."
         ),
     }
-}
-
-/// A folder of its own within the workspace's: cargo, which runs this test, may hold the lock of the latter.
-fn target_folder() -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace is one folder up");
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), |dir| workspace.join(dir));
-    target.join("board")
 }

@@ -13,12 +13,15 @@ pub(super) struct Stamp {
     pub(super) t_us: u64,
     /// Microseconds since 1970, UTC; unknown when the mark that tells is damaged.
     pub(super) unix_us: Option<i64>,
+    /// The same; where it is unknown, a time that keeps the log's order: the last known one, and what has passed since on the board's
+    /// clock.
+    pub(super) log_us: i64,
 }
 
 impl Stamp {
-    /// The time to sort by, microseconds: since 1970, or else since the board's start.
+    /// The time to sort by, microseconds since 1970.
     pub(super) fn microseconds(&self) -> u64 {
-        self.unix_us.and_then(|unix_us| u64::try_from(unix_us).ok()).unwrap_or(self.t_us)
+        u64::try_from(self.log_us).unwrap_or(0)
     }
 }
 

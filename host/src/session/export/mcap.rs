@@ -34,6 +34,7 @@ pub(super) struct McapWriter<W: Write + Seek> {
     bar: TableChannel,
     tool_pose: u16,
     notes: u16,
+    facts: BTreeMap<String, String>,
     /// The message being made.
     message: Vec<u8>,
 }
@@ -59,8 +60,7 @@ impl<W: Write + Seek> McapWriter<W> {
         let tool_pose = channel(&mut file, "/tool_pose", "foxglove.PoseInFrame", &pose_schema())?;
         let notes = channel(&mut file, "/log", "foxglove.Log", &log_schema())?;
         let facts = shape.facts(&TableName::Samples.columns(shape));
-        file.write_metadata(&Metadata { name: "ballbar".into(), metadata: facts }).map_err(io_error)?;
-        Ok(Self { file, samples, settled, bar, tool_pose, notes, message: Vec::new() })
+        Ok(Self { file, samples, settled, bar, tool_pose, notes, facts, message: Vec::new() })
     }
 
     fn row(&mut self, table: TableName, stamp: &Stamp, values: &[Value]) -> Result<()> {
@@ -118,6 +118,8 @@ impl<W: Write + Seek> Writer for McapWriter<W> {
     }
 
     fn finish(mut self: Box<Self>) -> Result<()> {
+        // A metadata record ends the chunk before it: written first, it would leave a chunk without messages, whose time is 1970.
+        self.file.write_metadata(&Metadata { name: "ballbar".into(), metadata: self.facts }).map_err(io_error)?;
         self.file.finish().map_err(io_error)?;
         self.file.into_inner().flush()
     }

@@ -22,11 +22,15 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use super::log::{LogError, LogReader};
+use super::summary::{LogSummary, Summing};
+use super::{DESCRIPTION_NAME, PLAN_NAME, POSES_NAME, RIG_NAME, ROBOT_NAME};
 use crate::files::{PendingFile, WriteError, commit_all};
 use entry::{Entry, Writer};
 use shape::Shape;
-use table::TableName;
 use teller::Teller;
+
+/// Files of a session beside its log.
+const SESSION_NAMES: [&str; 5] = [DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME];
 
 /// A format that a log can be exported to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,18 +43,7 @@ pub enum LogFormat {
     Mcap,
 }
 
-/// What was exported.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Exported {
-    /// Samples.
-    pub samples: u64,
-    /// Settled poses; only MCAP holds them.
-    pub settled: u64,
-    /// Tool poses; only MCAP holds them.
-    pub tool_poses: u64,
-}
-
-/// Why a log could not be exported. No file was written or changed then.
+/// Why a log could not be exported. No file was written or changed then, but those that [`WriteError`] names.
 #[derive(Debug, Error, Diagnostic)]
 pub enum LogExportError {
     /// The log.
@@ -61,7 +54,11 @@ pub enum LogExportError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Write(#[from] WriteError),
-    /// Two outputs in one file, or one that would take the log's place.
+    /// The user wants to end.
+    #[error("ended by Ctrl-C or a signal")]
+    #[diagnostic(help("Nothing was written."))]
+    Interrupted,
+    /// Two outputs in one file, or one that would take the place of a file of the session.
     #[error("{}: is named twice, as an output and as {other}", path.display())]
     #[diagnostic(help("Give every file a name of its own."))]
     SameFile {
@@ -72,25 +69,33 @@ pub enum LogExportError {
     },
 }
 
-/// Exports a log, or the log in a session's directory. All files are written, or none.
+/// Exports a log, or the log in a session's directory, until `is_ended`. Files are put in place when all have been written. Returns
+/// what was exported; settled poses and tool poses are in MCAP only.
 ///
 /// # Errors
 /// [`LogExportError`].
-pub fn export_log(log: &Path, outputs: &[(LogFormat, PathBuf)]) -> Result<Exported, LogExportError> {
-    let shape = Shape::read(&mut LogReader::open(log)?)?;
+pub fn export_log(
+    log: &Path,
+    outputs: &[(LogFormat, PathBuf)],
+    is_ended: &dyn Fn() -> bool,
+) -> Result<LogSummary, LogExportError> {
     let mut reader = LogReader::open(log)?;
     check_names(reader.path(), outputs)?;
+    let shape = Shape::read(&mut LogReader::open(log)?, is_ended)?;
     let mut files: Vec<PendingFile> = outputs.iter().map(|(_, path)| PendingFile::begin(path)).collect::<Result<_, _>>()?;
-    let exported = write_all(&mut reader, &shape, outputs, &mut files)?;
+    let exported = write_all(&mut reader, &shape, outputs, &mut files, is_ended)?;
     commit_all(files)?;
     Ok(exported)
 }
 
 fn check_names(log: &Path, outputs: &[(LogFormat, PathBuf)]) -> Result<(), LogExportError> {
     for (i, (_, path)) in outputs.iter().enumerate() {
-        let other = if is_same(path, log) {
+        let place = place_of(path);
+        let other = if place == place_of(log) {
             "the log"
-        } else if outputs[..i].iter().any(|(_, earlier)| is_same(path, earlier)) {
+        } else if SESSION_NAMES.iter().any(|name| place == place_of(&log.with_file_name(name))) {
+            "a file of the session"
+        } else if outputs[..i].iter().any(|(_, earlier)| place == place_of(earlier)) {
             "another output"
         } else {
             continue;
@@ -100,9 +105,14 @@ fn check_names(log: &Path, outputs: &[(LogFormat, PathBuf)]) -> Result<(), LogEx
     Ok(())
 }
 
-/// Whether two names mean one file, as far as that can be told before it is there.
-fn is_same(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+/// What a name stands for, so that two names of one file are the same: links followed, and of a file that is not there yet those to
+/// its folder.
+fn place_of(path: &Path) -> PathBuf {
+    let new = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(new).unwrap_or_else(|| path.to_owned())
 }
 
 fn write_all(
@@ -110,7 +120,8 @@ fn write_all(
     shape: &Shape,
     outputs: &[(LogFormat, PathBuf)],
     files: &mut [PendingFile],
-) -> Result<Exported, LogExportError> {
+    is_ended: &dyn Fn() -> bool,
+) -> Result<LogSummary, LogExportError> {
     let mut writers: Vec<(&Path, Box<dyn Writer + '_>)> = Vec::new();
     for ((format, path), file) in outputs.iter().zip(files) {
         let file = std::io::BufWriter::new(file.file_mut());
@@ -121,7 +132,7 @@ fn write_all(
         };
         writers.push((path, writer.map_err(|error| WriteError::new(path, error))?));
     }
-    let exported = tell_all(reader, shape, |entry| {
+    let exported = tell_all(reader, shape, is_ended, |entry| {
         writers.iter_mut().try_for_each(|(path, writer)| writer.take(entry).map_err(|error| WriteError::new(path, error)))
     })?;
     for (path, writer) in writers {
@@ -134,21 +145,18 @@ fn write_all(
 fn tell_all(
     reader: &mut LogReader,
     shape: &Shape,
+    is_ended: &dyn Fn() -> bool,
     mut tell: impl FnMut(&Entry) -> Result<(), WriteError>,
-) -> Result<Exported, LogExportError> {
-    let mut exported = Exported::default();
+) -> Result<LogSummary, LogExportError> {
+    let mut summing = Summing::default();
     let mut teller = Teller::new(shape);
     for _ in 0..shape.records {
         let Some(record) = reader.next_record()? else { break };
-        teller.take(record, &mut |entry: &Entry| {
-            match entry {
-                Entry::Row { table: TableName::Samples, .. } => exported.samples += 1,
-                Entry::Row { table: TableName::Settled, .. } => exported.settled += 1,
-                Entry::ToolPose { .. } => exported.tool_poses += 1,
-                Entry::Row { table: TableName::Bar, .. } | Entry::Note { .. } => {}
-            }
-            tell(entry)
-        })?;
+        if is_ended() {
+            return Err(LogExportError::Interrupted);
+        }
+        summing.take(&record);
+        teller.take(record, &mut tell)?;
     }
-    Ok(exported)
+    Ok(summing.end(reader))
 }

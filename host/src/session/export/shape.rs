@@ -7,7 +7,9 @@ use ballbar::JointKind;
 use ballbar::wire::{Answer, Event, ToHost};
 
 use super::super::description::{BoardDescription, RobotDescription};
-use super::super::log::{LogError, LogReader, Record};
+use super::super::log::{LogReader, Record};
+use super::super::segments::unix_ms_of;
+use super::LogExportError;
 use super::table::Column;
 
 /// What a whole log needs columns for, and what it was recorded with.
@@ -15,6 +17,8 @@ use super::table::Column;
 pub(super) struct Shape {
     /// Entries of the log.
     pub(super) records: u64,
+    /// Time of the first mark that is whole, milliseconds since 1970.
+    pub(super) first_mark_ms: Option<u64>,
     /// Encoders of the smallest board.
     pub(super) encoders_min: usize,
     /// Encoders of the largest board.
@@ -32,11 +36,12 @@ impl Shape {
     /// Reads a log to its end.
     ///
     /// # Errors
-    /// [`LogError`].
-    pub(super) fn read(reader: &mut LogReader) -> Result<Self, LogError> {
+    /// [`LogExportError::Log`], [`LogExportError::Interrupted`].
+    pub(super) fn read(reader: &mut LogReader, is_ended: &dyn Fn() -> bool) -> Result<Self, LogExportError> {
         let log = log_name(reader.path());
         let mut shape = Self {
             records: 0,
+            first_mark_ms: None,
             encoders_min: usize::MAX,
             encoders_max: 0,
             joints: Vec::new(),
@@ -46,6 +51,9 @@ impl Shape {
         };
         while let Some(record) = reader.next_record()? {
             shape.records += 1;
+            if is_ended() {
+                return Err(LogExportError::Interrupted);
+            }
             if let Record::Message(message) = record {
                 shape.take(&message);
             }
@@ -78,7 +86,9 @@ impl Shape {
                 Event::Settled(pose) => self.encoders(pose.counts_mean.len()),
                 Event::Poses(_) => {}
             },
-            ToHost::Mark(_) => {}
+            ToHost::Mark(mark) => {
+                self.first_mark_ms.get_or_insert(unix_ms_of(*mark));
+            }
         }
     }
 

@@ -173,15 +173,16 @@ impl Setting<'_> {
         self.robot.map_or(Value::Unknown, |robot| Value::Flag(robot.is_homed(self.homed)))
     }
 
-    /// Joint values; those of another robot in the same log are unknown.
-    fn joints(&self, counts: impl Iterator<Item = f64>, row: &mut Vec<Value>) {
+    /// Joint values; those of another robot in the same log, and of joints that the row's board has no encoder for, are unknown.
+    fn joints(&self, counts: impl ExactSizeIterator<Item = f64>, row: &mut Vec<Value>) {
         let Some(robot) = self.robot else {
             row.extend(self.shape.joints.iter().map(|_| Value::Unknown));
             return;
         };
+        let encoders = counts.len();
         let q = robot.q(counts);
         row.extend(self.shape.joints.iter().map(|&(joint, kind): &(usize, JointKind)| {
-            let is_there = robot.kinds().get(joint) == Some(&kind);
+            let is_there = joint < encoders && robot.kinds().get(joint) == Some(&kind);
             let value = q.as_array().get(joint).filter(|_| is_there);
             value.map_or(Value::Unknown, |&q| real(ScreenUnit::from(kind).from_si(q), JOINT_DECIMALS))
         }));

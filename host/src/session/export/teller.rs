@@ -3,6 +3,7 @@
 use ballbar::wire::{Answer, Event, LogMark, Stream, ToHost};
 
 use super::super::log::Record;
+use super::super::segments::{Segments, unix_ms_of};
 use super::entry::{Entry, Stamp};
 use super::shape::Shape;
 use super::table::{Setting, TableName, Value};
@@ -11,7 +12,8 @@ use crate::board::{RobotOnBoard, StreamTally};
 /// Follows a log.
 pub(super) struct Teller<'a> {
     shape: &'a Shape,
-    /// Raised by every mark: within one segment nothing is missing but what the indices show.
+    segments: Segments,
+    /// Number of this one: within it nothing is missing but what the indices show.
     segment: u32,
     clock: Clock,
     /// What the board of this segment uses, from where it said so.
@@ -22,17 +24,21 @@ pub(super) struct Teller<'a> {
 
 impl<'a> Teller<'a> {
     pub(super) fn new(shape: &'a Shape) -> Self {
-        Self { shape, segment: 0, clock: Clock::default(), robot: None, tally: StreamTally::default(), row: Vec::new() }
+        let clock = Clock { now_us: shape.first_mark_ms.and_then(us_from_ms).unwrap_or(0), ..Clock::default() };
+        let (segments, tally) = (Segments::default(), StreamTally::default());
+        Self { shape, segments, segment: 0, clock, robot: None, tally, row: Vec::new() }
     }
 
     /// Takes the next record and tells what it holds.
     pub(super) fn take<E>(&mut self, record: Record, tell: &mut impl FnMut(&Entry) -> Result<(), E>) -> Result<(), E> {
+        if self.segments.begins(&record) {
+            self.begin_segment(&record);
+        }
         let Record::Message(message) = record else {
             return tell(&self.note(true, "a frame is torn or damaged".into()));
         };
         match *message {
             ToHost::Mark(mark) => {
-                self.begin_segment(mark);
                 let (is_warning, text) = match mark {
                     LogMark::Opened { .. } => (false, "recording begins"),
                     LogMark::Lost { .. } => (true, "the port was lost"),
@@ -41,6 +47,9 @@ impl<'a> Teller<'a> {
                 tell(&self.note(is_warning, format!("segment {}: {text}", self.segment)))
             }
             ToHost::Hello(hello) => {
+                if !self.clock.is_known {
+                    tell(&self.note(true, format!("segment {}: its mark is damaged, its time unknown", self.segment)))?;
+                }
                 self.clock.greet(hello.uptime_us);
                 tell(&self.note(false, format!("board {}, firmware {}", hello.board, hello.firmware)))
             }
@@ -55,12 +64,17 @@ impl<'a> Teller<'a> {
     }
 
     /// Another board may answer from here on: it has said nothing yet of its parameters, and its clock is another.
-    fn begin_segment(&mut self, mark: LogMark) {
-        let (LogMark::Opened { unix_ms } | LogMark::Lost { unix_ms } | LogMark::Back { unix_ms }) = mark;
+    fn begin_segment(&mut self, first: &Record) {
         self.segment += 1;
         self.robot = None;
         self.tally.interrupt();
-        self.clock = Clock::at(unix_ms);
+        self.clock.begin(match first {
+            Record::Message(message) => match **message {
+                ToHost::Mark(mark) => us_from_ms(unix_ms_of(mark)),
+                _ => None,
+            },
+            Record::Damaged => None,
+        });
     }
 
     fn stream<E>(&mut self, stream: &Stream, tell: &mut impl FnMut(&Entry) -> Result<(), E>) -> Result<(), E> {
@@ -106,7 +120,8 @@ impl<'a> Teller<'a> {
 
     /// A note of the time that the clock shows.
     fn note(&self, is_warning: bool, text: String) -> Entry<'static> {
-        let stamp = Stamp { unix_us: self.clock.now_us, ..Stamp::default() };
+        let now_us = self.clock.now_us;
+        let stamp = Stamp { unix_us: self.clock.is_known.then_some(now_us), log_us: now_us, ..Stamp::default() };
         Entry::Note { stamp, is_warning, text }
     }
 }
@@ -124,19 +139,23 @@ fn start_us(event: &Event) -> u64 {
 /// taken for one moment: the calendar's time is late by what lay between, while differences are the board's own.
 #[derive(Clone, Copy, Debug, Default)]
 struct Clock {
-    /// Time of the segment's mark, then of what was told last; microseconds since 1970.
-    now_us: Option<i64>,
+    /// Time of the latest mark, then of what was told last; microseconds since 1970.
+    now_us: i64,
+    /// This segment's mark was read. Where it was not, the times above go on from the last one known, so that what a log tells stays
+    /// in its order.
+    is_known: bool,
     /// What to add to the board's time, microseconds.
     offset_us: Option<i64>,
 }
 
 impl Clock {
-    fn at(unix_ms: u64) -> Self {
-        Self { now_us: i64::try_from(unix_ms).ok().and_then(|ms| ms.checked_mul(1_000)), offset_us: None }
+    /// Another segment, with the time of its mark where that is known.
+    fn begin(&mut self, mark_us: Option<i64>) {
+        *self = Self { now_us: mark_us.unwrap_or(self.now_us), is_known: mark_us.is_some(), offset_us: None };
     }
 
     fn greet(&mut self, uptime_us: u64) {
-        self.offset_us = self.now_us.and_then(|now_us| now_us.checked_sub_unsigned(uptime_us));
+        self.offset_us = self.now_us.checked_sub_unsigned(uptime_us);
     }
 
     /// When something was by the board's clock. Without a hello, the first thing that came is taken for the mark's moment.
@@ -144,8 +163,12 @@ impl Clock {
         if self.offset_us.is_none() {
             self.greet(t_us);
         }
-        let unix_us = self.offset_us.and_then(|offset_us| offset_us.checked_add_unsigned(t_us));
-        self.now_us = unix_us.or(self.now_us);
-        Stamp { index, t_us, unix_us }
+        let told_us = self.offset_us.and_then(|offset_us| offset_us.checked_add_unsigned(t_us));
+        self.now_us = told_us.unwrap_or(self.now_us);
+        Stamp { index, t_us, unix_us: told_us.filter(|_| self.is_known), log_us: self.now_us }
     }
+}
+
+fn us_from_ms(unix_ms: u64) -> Option<i64> {
+    i64::try_from(unix_ms).ok()?.checked_mul(1_000)
 }
