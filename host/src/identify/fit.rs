@@ -1,16 +1,16 @@
 //! A fit, whole: from a design and a dataset to parameters, how sure they are, and what poses left out say of them.
 
-use std::collections::HashMap;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use ballbar::{Chain, Damping, FreeParameters, Kinematics, MAX_JOINTS, Measurement, Parameter, ParameterUnit};
+use ballbar::{Chain, Damping, FreeParameters, Kinematics, Measurement, Parameter, ParameterUnit};
 use miette::Diagnostic;
 use thiserror::Error;
 
 use super::hold::{Held, Hold, HoldError};
 use super::identifiability::Identifiability;
 use super::lm::{LmOptions, Solution, Status, solve};
+use super::postures::postures;
 use super::residuals::{
     Outlier, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
 };
@@ -123,6 +123,9 @@ pub struct Fit {
     pub cross_validation: Option<CrossValidation>,
     /// Residuals of all rows while they were left out; none where there is no cross-validation.
     pub left_out: Vec<Residual>,
+    /// Residuals when only where the robot's base stands is fitted, the six parameters of its first link; `None` when `--hold` names one
+    /// of them.
+    pub base_alone: Option<ResidualSummary>,
 }
 
 impl Fit {
@@ -183,6 +186,7 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
     let uncertainty = Uncertainty::new(&solution.chain, &measurements, &free);
     let before = residuals(design, dataset);
     let after = residuals(&solution.chain, dataset);
+    let base_alone = base_alone(design, dataset, &measurements, &reasons, &lm);
     let (cross_validation, left_out) = cross_validate(design, &measurements, &free, &lm).unzip();
     Ok(Fit {
         solve_time,
@@ -196,9 +200,27 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
         neighbour_correlation: neighbour_correlation(dataset, &after),
         cross_validation,
         left_out: left_out.unwrap_or_default(),
+        base_alone,
         residuals: after,
         uncertainty,
         solution,
+    })
+}
+
+/// What of the design's error is only that nobody knew where the robot stands: no fault of the robot, and corrected by a frame.
+fn base_alone(
+    design: &Chain<f64>,
+    dataset: &Dataset,
+    measurements: &[Measurement<f64>],
+    reasons: &[Option<Held>],
+    lm: &LmOptions,
+) -> Option<ResidualSummary> {
+    /// Position and orientation of the first link, the first in parameter order.
+    const BASE: usize = 6;
+    let is_wanted = reasons.iter().take(BASE).all(|held| !matches!(held, Some(Held::ByName)));
+    is_wanted.then(|| {
+        let base = solve(design, measurements, &FreeParameters::all(BASE), lm).chain;
+        ResidualSummary::new(&residuals(&base, dataset))
     })
 }
 
@@ -223,22 +245,15 @@ fn fitted_parameters(
 }
 
 /// Cross-validation in five parts, or in more where five would leave too few poses to fit; `None` where any would. Rows of the
-/// same joint vector stay together: lengths to other spheres of one pose are no independent proof of it.
+/// same posture stay together: lengths to other spheres of one pose are no independent proof of it.
 fn cross_validate(
     design: &Chain<f64>,
     measurements: &[Measurement<f64>],
     free: &FreeParameters,
     lm: &LmOptions,
 ) -> Option<(CrossValidation, Vec<Residual>)> {
-    let mut numbers: HashMap<[u64; MAX_JOINTS], usize> = HashMap::new();
-    let group_of_row: Vec<usize> = measurements
-        .iter()
-        .map(|measurement| {
-            let next = numbers.len();
-            *numbers.entry(measurement.q.as_array().map(f64::to_bits)).or_insert(next)
-        })
-        .collect();
-    let groups = numbers.len();
+    let group_of_row = postures(design.joint_kinds(), measurements.iter().map(|measurement| &measurement.q));
+    let groups = group_of_row.iter().max().map_or(0, |last| last + 1);
     let kept = |folds: usize, fold: usize| group_of_row.iter().filter(|&group| group % folds != fold).count();
     let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| kept(folds, fold) > free.len());
     let folds = [5, 10, groups].into_iter().find(enough)?;

@@ -17,6 +17,7 @@ mod lm;
 mod normality;
 mod observation;
 mod pivoting;
+mod postures;
 mod residuals;
 mod spectrum;
 mod uncertainty;
@@ -28,6 +29,7 @@ pub use identifiability::{Finding, Identifiability, plausible_error};
 pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
 pub use normality::{AndersonDarling, anderson_darling};
 pub use observation::Observation;
+pub use postures::postures;
 pub use residuals::{
     Outlier, OutlierTest, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
 };

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use ballbar::{Chain, JointKind, Kinematics, Vector3};
+use ballbar::{JointKind, Kinematics, Vector3};
 use nalgebra::DMatrix;
 
+use super::proof::{Proof, ProofKind, proofs};
 use super::verdict::Verdict;
 use super::workspace::Workspace;
 use crate::files::{Dataset, PairingId, PoseRow, Rig, Robot};
@@ -73,36 +74,6 @@ pub struct Shell {
     pub radius_m: f64,
 }
 
-/// How well lengths are predicted that the fit has not seen.
-#[derive(Clone, Debug)]
-pub struct Proof {
-    /// Which lengths, to follow "on".
-    pub name: String,
-    /// Whether no fit at all has seen them; otherwise parts of the fitted poses were left out in turn.
-    pub is_apart: bool,
-    /// Residuals with the design, metres.
-    pub before: Vec<Residual>,
-    /// Residuals with the fit, metres.
-    pub after: Vec<Residual>,
-}
-
-impl Proof {
-    /// Size of the residuals with the design.
-    pub fn before_summary(&self) -> ResidualSummary {
-        ResidualSummary::new(&self.before)
-    }
-
-    /// Size of the residuals with the fit.
-    pub fn after_summary(&self) -> ResidualSummary {
-        ResidualSummary::new(&self.after)
-    }
-
-    /// Whether the fit predicts these lengths worse than the design does.
-    pub fn speaks_against(&self) -> bool {
-        self.is_apart && self.after_summary().rms_m > self.before_summary().rms_m
-    }
-}
-
 /// Singular values of all columns at the design, scaled.
 #[derive(Clone, Debug)]
 pub struct Singular {
@@ -146,8 +117,12 @@ pub struct Facts {
     pub before: ResidualSummary,
     /// Residuals of the fitted poses with the fit.
     pub after: ResidualSummary,
-    /// What the fit has not seen: files and poses held out, then its own poses left out in turn.
+    /// What the fit has not seen: files and poses held out, its own poses left out in turn, then other lengths of fitted postures.
     pub proofs: Vec<Proof>,
+    /// Residuals when only where the robot's base stands was fitted.
+    pub base_alone: Option<ResidualSummary>,
+    /// When the robot that the fit began with was calibrated, if it was: "before" is no design then.
+    pub calibrated: Option<String>,
     /// All parameters.
     pub parameters: Vec<FittedParameter>,
     /// What the poses can tell.
@@ -199,6 +174,8 @@ impl Facts {
             before: fit.initial,
             after: fit.fitted,
             proofs: proofs(inputs, before),
+            base_alone: fit.base_alone,
+            calibrated: robot.calibration.as_ref().map(|calibration| calibration.when.clone()),
             parameters: fit.parameters.clone(),
             singular: Singular {
                 values: fit.identifiability.spectrum.singular_values.clone(),
@@ -225,6 +202,13 @@ impl Facts {
     /// Number of parameters that the fit was free to change.
     pub fn free_parameters(&self) -> usize {
         self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
+    }
+
+    /// The proof that says the least good of the fit: the one to go by.
+    pub fn decisive_proof(&self) -> Option<&Proof> {
+        let unseen = self.proofs.iter().filter(|proof| proof.kind != ProofKind::SamePostures);
+        let worst = unseen.max_by(|a, b| a.after_summary().rms_m.total_cmp(&b.after_summary().rms_m));
+        worst.or(self.proofs.first())
     }
 
     /// Whether the files say that some lengths are surer than others.
@@ -278,24 +262,6 @@ fn shells(rows: &[RowFact], pairings: &[PairingId]) -> Vec<Shell> {
         (lengths_m[lengths_m.len() - 1] - lengths_m[0] <= WIDEST * radius_m).then_some(Shell { chuck, radius_m })
     };
     lengths.into_iter().filter_map(shell).collect()
-}
-
-fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
-    let Inputs { robot, fit, .. } = inputs;
-    let of = |chain: &Chain<f64>, rows: &Dataset| residuals(chain, rows);
-    let unseen = inputs.unseen.iter().map(|(name, rows)| Proof {
-        name: name.clone(),
-        is_apart: true,
-        before: of(&robot.chain, rows),
-        after: of(&fit.solution.chain, rows),
-    });
-    let folds = fit.cross_validation.map(|proof| Proof {
-        name: format!("the fitted poses, each predicted by a fit without it ({} parts)", proof.folds),
-        is_apart: false,
-        before,
-        after: fit.left_out.clone(),
-    });
-    unseen.chain(folds).collect()
 }
 
 fn correlation(fit: &Fit) -> Correlation {

@@ -10,13 +10,15 @@
 mod facts;
 mod figures;
 mod page;
+mod proof;
 mod tables;
 mod verdict;
 mod workspace;
 
-pub use facts::{Correlation, Facts, Inputs, Proof, RowFact, Shell, Singular};
+pub use facts::{Correlation, Facts, Inputs, RowFact, Shell, Singular};
 pub use figures::{Drawing, Figure, FigureError, Table, all as figures};
 pub use page::html;
+pub use proof::{Proof, ProofKind};
 pub use tables::parameters_table;
 pub use verdict::{Answer, Verdict};
 pub use workspace::{Slice, Workspace, WorkspacePoint};

@@ -4,11 +4,11 @@ use ballbar::Vector3;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::json;
 
-use super::facts::{Facts, Proof, RowFact};
+use super::facts::{Facts, RowFact};
 use super::figures::{CHUCKS, Figure, dark_rules, hex, wires_m};
+use super::proof::Proof;
 use super::tables::{largest, parameters};
-use super::verdict::{Answer, Verdict, rms_text};
-use crate::identify::ResidualSummary;
+use super::verdict::{Answer, Verdict};
 use crate::units::{fixed, mm_from_m};
 
 const STYLE: &str = include_str!("page.css");
@@ -79,7 +79,7 @@ fn numbers(facts: &Facts) -> Markup {
     let mm = |m: f64| format!("{} mm", fixed(mm_from_m(m), 3));
     html! {
         dl {
-            @if let Some(proof) = facts.proofs.first() {
+            @if let Some(proof) = facts.decisive_proof() {
                 @let (before, after) = (proof.before_summary(), proof.after_summary());
                 (big("lengths not seen: RMS before", &mm(before.rms_m)))
                 (big("RMS after", &mm(after.rms_m)))
@@ -95,7 +95,7 @@ fn numbers(facts: &Facts) -> Markup {
 
 /// What the answer rests on.
 fn grounds(facts: &Facts) -> Vec<Markup> {
-    let rms = |summary: ResidualSummary| rms_text(summary.rms_m, summary.count);
+    let mm = |m: f64| format!("{} mm", fixed(mm_from_m(m), 3));
     let pairings = facts.pairings.len();
     let told = html! {
         (facts.rows.len()) " lengths of " (pairings) (if pairings == 1 { " pairing" } else { " pairings" }) " tell " (facts.told)
@@ -105,12 +105,18 @@ fn grounds(facts: &Facts) -> Vec<Markup> {
     let proof = |proof: &Proof| {
         let after = proof.after_summary();
         html! {
-            "On " (proof.name) ", " (after.count) " lengths: RMS " (rms(proof.before_summary())) " before, " b { (rms(after)) } " after; mean "
-            (fixed(mm_from_m(after.mean_m), 3)) " mm, largest " (fixed(mm_from_m(after.max_abs_m), 3)) " mm."
+            "On " (proof.name) ", " (after.count) " lengths in " (proof.posture_count()) " postures: RMS " (mm(proof.before_summary().rms_m))
+            " before, " b { (mm(after.rms_m)) } " after"
+            @if let Some(error_m) = proof.rms_error_m() { " (standard error " (mm(error_m)) ", by posture)" }
+            "; mean " (mm(after.mean_m)) ", largest " (mm(after.max_abs_m)) "."
         }
     };
     let fitted = html! {
-        "On the fitted lengths themselves: RMS " (rms(facts.before)) " before, " (rms(facts.after)) " after, which alone would prove nothing."
+        "On the fitted lengths themselves: RMS " (mm(facts.before.rms_m)) " before, " (mm(facts.after.rms_m))
+        " after, which alone would prove nothing."
+        @if let Some(base) = facts.base_alone {
+            " With only the place of the robot's base corrected it would be " (mm(base.rms_m)) "."
+        }
     };
     let mut grounds = vec![told];
     grounds.extend(facts.proofs.iter().map(proof));

@@ -1,7 +1,7 @@
 //! The answer of the first screen: what the result is called, with what reserve, and what it does not say.
 
 use super::facts::Facts;
-use crate::units::{fixed, mm_from_m};
+use super::proof::ProofKind;
 
 /// What the result is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +53,8 @@ pub struct Verdict {
 pub(super) const ALIKE: f64 = 0.5;
 /// Lengths left out may be predicted by this factor worse than those fitted before it is said.
 const MUCH_WORSE: f64 = 2.0;
+/// Of normal residuals one set in a thousand looks less normal.
+const SURELY_NOT: f64 = 1e-3;
 /// Files of poses end at a nanometre: residuals below a micrometre are of simulations without noise, and compare with nothing.
 const ROUNDING_M: f64 = 1e-6;
 
@@ -82,11 +84,21 @@ fn against(facts: &Facts) -> impl Iterator<Item = String> + '_ {
 
 fn reserves(facts: &Facts) -> Vec<String> {
     let mut reserves = Vec::new();
-    let (told, independent) = (facts.told, facts.independent);
-    if told < independent {
+    if let Some(when) = &facts.calibrated {
         reserves.push(format!(
-            "These poses tell {told} of the {independent} parameters that lengths can tell of this robot: where the others matter, \
+            "The robot's file was calibrated already ({when}): \"before\" is that calibration and no design, and if it was fitted to these \
+             poses, neither number proves anything."
+        ));
+    }
+    let (told, independent, able) = (facts.told, facts.independent, facts.singular.rank);
+    if able < independent {
+        reserves.push(format!(
+            "These poses tell {able} of the {independent} parameters that lengths can tell of this robot: where the others matter, \
              the tool may be as wrong as before."
+        ));
+    } else if told < independent {
+        reserves.push(format!(
+            "Of {independent} parameters that these poses tell, {told} were fitted: the others were held, right or wrong."
         ));
     }
     match facts.outliers.as_slice() {
@@ -104,12 +116,27 @@ fn reserves(facts: &Facts) -> Vec<String> {
              as the zero of the bar, and all deviations on this page are too small."
         ));
     }
-    if let Some(proof) = facts.proofs.first() {
+    if let Some(normality) = facts.normality.filter(|normality| normality.p_value < SURELY_NOT) {
+        reserves.push(format!(
+            "Residuals do not look like noise (Anderson-Darling, p = {:.1e}): the robot or the bar does something that the model does not \
+             hold.",
+            normality.p_value
+        ));
+    }
+    for proof in facts.proofs.iter().filter(|proof| !facts.is_unchanged && !proof.speaks_against() && !proof.speaks_for()) {
+        reserves.push(format!(
+            "On {}, {} postures are too few, or the difference too small, to say that the fit predicts better than the design.",
+            proof.name,
+            proof.posture_count()
+        ));
+    }
+    if let Some(proof) = facts.decisive_proof() {
         let factor = proof.after_summary().rms_m / facts.after.rms_m.max(f64::MIN_POSITIVE);
         if factor > MUCH_WORSE && proof.after_summary().rms_m > ROUNDING_M && !facts.is_unchanged {
             reserves.push(format!(
-                "Lengths not seen are predicted {factor:.1} times worse than those fitted: the poses are few or alike for so many \
-                 parameters. Trust the larger number."
+                "Lengths not seen are predicted {factor:.1} times worse than those fitted, on {}: the poses are few or alike for so many \
+                 parameters. Trust the larger number.",
+                proof.name
             ));
         }
     }
@@ -118,7 +145,7 @@ fn reserves(facts: &Facts) -> Vec<String> {
 
 fn not_said(facts: &Facts) -> Vec<String> {
     let mut not_said = Vec::new();
-    if !facts.proofs.iter().any(|proof| proof.is_apart) {
+    if !facts.proofs.iter().any(|proof| proof.kind == ProofKind::Apart) {
         not_said.push(
             "That other lengths were tried: the proof is by parts of the same poses, left out in turn. Poses of another day or bar \
              (--validate) are a better one."
@@ -135,14 +162,6 @@ fn not_said(facts: &Facts) -> Vec<String> {
             .to_owned(),
     );
     not_said
-}
-
-/// `0.101 ± 0.008 mm`: an RMS and the standard error that so many independent normal residuals give it, `RMS/√(2n)`.
-pub(super) fn rms_text(rms_m: f64, count: usize) -> String {
-    const FEWEST: usize = 8;
-    let rms_mm = mm_from_m(rms_m);
-    let error_mm = rms_mm / (2.0 * count as f64).sqrt();
-    if count < FEWEST { format!("{} mm", fixed(rms_mm, 3)) } else { format!("{} ± {} mm", fixed(rms_mm, 3), fixed(error_mm, 3)) }
 }
 
 fn sentence(text: &str) -> String {
