@@ -161,6 +161,19 @@ fn a_slide_nearly_parallel_to_its_neighbour_has_an_ordinary_table() {
     }
 }
 
+#[test]
+fn parameters_as_csv_are_the_numbers_of_the_robot_file() {
+    for (name, text) in ROBOTS {
+        let words = text.split(|c: char| !(c.is_ascii_digit() || "+-.e".contains(c)));
+        let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+        let csv = export(&Robot::open(name).unwrap(), Format::Csv, JointZero::Model).unwrap().text;
+        for line in csv.lines().skip_while(|line| *line != "parameter,unit,value").skip(1) {
+            let value: f64 = line.rsplit(',').next().unwrap().parse().unwrap();
+            assert!(numbers.contains(&value), "{name}: {line}");
+        }
+    }
+}
+
 const ODD_AXES: &str = r#"<robot name="odd">
   <link name="world"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="tool"/><link name="camera"/>
   <joint name="stand" type="fixed"><parent link="world"/><child link="a"/><origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.5 0.6"/></joint>
