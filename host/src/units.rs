@@ -66,6 +66,14 @@ impl ScreenUnit {
     }
 }
 
+/// The number that a file has where the program has `si`: of those that are read as `si` itself the one with the fewest digits.
+pub fn as_in_a_file(unit: ScreenUnit, si: f64) -> f64 {
+    let near = unit.from_si(si);
+    let candidates = [near, near.next_down(), near.next_up(), near.next_down().next_down(), near.next_up().next_up()];
+    let exact = candidates.into_iter().filter(|&value| unit.to_si(value) == si);
+    exact.min_by_key(|value| format!("{value:?}").len()).unwrap_or(near)
+}
+
 impl From<ParameterUnit> for ScreenUnit {
     fn from(unit: ParameterUnit) -> Self {
         match unit {

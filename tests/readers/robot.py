@@ -1,6 +1,6 @@
-"""Poses of the tool by a robot's file, as 4 by 4 matrices: `robot.py FORMAT FILE JOINTS [BASE TIP]`.
+"""Poses of the tool by a robot's file, as 4 by 4 matrices, and its limits: `robot.py FORMAT FILE JOINTS [BASE TIP]`.
 
-JOINTS is JSON: a list of vectors of encoder outputs, radians or metres. BASE and TIP are links of a URDF that is a tree. Nothing here is shared with what wrote the file: the file is
+JOINTS is JSON: a list of vectors of encoder outputs, radians or metres. Limits are those of the encoder outputs, null where the file has none. BASE and TIP are links of a URDF that is a tree. Nothing here is shared with what wrote the file: the file is
 read by a library where there is one, and transforms are products of elementary matrices.
 """
 
@@ -81,7 +81,14 @@ def urdf(text, base=None, tip=None):
             matrix = matrix @ (shifted(*(axis * value)) if joint.type == "prismatic" else turned(axis, value))
         return matrix
 
-    return pose
+    def encoder_limits(joint):
+        if joint.type == "continuous":
+            return None
+        encoder = encoders[joint.name]
+        offset, scale = (0, 1) if encoder is None else (float(encoder.get("offset")), float(encoder.get("scale")))
+        return sorted([(joint.limit.lower - offset) / scale, (joint.limit.upper - offset) / scale])
+
+    return pose, [encoder_limits(robot.joint_map[name]) for name in names if robot.joint_map[name].type != "fixed"]
 
 
 def ros2(text):
@@ -91,7 +98,7 @@ def ros2(text):
 def data(robot):
     links = [[*link["translation_m"], link["alpha_rad"], link["beta_rad"], link["gamma_rad"]] for link in robot["links"]]
     joints = [(joint["type"] == "prismatic", joint["offset"], joint["scale"]) for joint in robot["joints"]]
-    return lambda q: chain_pose(links, joints, q)
+    return lambda q: chain_pose(links, joints, q), [[joint["min"], joint["max"]] for joint in robot["joints"]]
 
 
 def parameters(text):
@@ -103,7 +110,8 @@ def parameters(text):
     letters = ["x", "y", "z", "alpha", "beta", "gamma"]
     links = [[values[f"{letter}{i}"] for letter in letters] for i in range(1, count + 2)]
     joints = [(units[f"offset{i}"] == "mm", values[f"offset{i}"], values[f"scale{i}"]) for i in range(1, count + 1)]
-    return lambda q: chain_pose(links, joints, q)
+    limits = [[values[f"min{i}"], values[f"max{i}"]] for i in range(1, count + 1)]
+    return lambda q: chain_pose(links, joints, q), limits
 
 
 def denavit_hartenberg(text, is_modified):
@@ -129,7 +137,7 @@ def denavit_hartenberg(text, is_modified):
             matrix = matrix @ (about_x @ about_z if is_modified else about_z @ about_x)
         return matrix @ tool
 
-    return pose
+    return pose, None
 
 
 READERS = {
@@ -144,6 +152,6 @@ READERS = {
 
 form, path, joints_path, *ends = sys.argv[1:]
 with open(path, encoding="utf-8", newline="") as file:
-    pose_at = READERS[form](file.read(), *ends)
+    pose_at, limits = READERS[form](file.read(), *ends)
 with open(joints_path, encoding="utf-8") as file:
-    print(json.dumps([pose_at(q).tolist() for q in json.load(file)]))
+    print(json.dumps({"poses": [pose_at(q).tolist() for q in json.load(file)], "limits": limits}))

@@ -236,7 +236,19 @@ fn a_posture_next_to_a_singular_one_is_warned_of() {
     let folder = TempDir::new().expect("a temporary folder");
     write_calibrated(folder.path(), "puma560");
     let straight = run(&folder, &format!("{JOINTS}0,-45,92,0,30,0\n"), &[]);
-    assert!(straight.stderr.contains("targets.csv:2: joint 3 turns by"), "{}", straight.transcript());
+    assert!(straight.stderr.contains("targets.csv:2: joint 3 goes"), "{}", straight.transcript());
+}
+
+#[test]
+fn a_pose_that_does_not_lead_back_to_the_joints_is_warned_of() {
+    let folder = TempDir::new().expect("a temporary folder");
+    write_calibrated(folder.path(), "puma560");
+    // A bent wrist, and a nearly straight one that calibration turns far about axis 4.
+    let rows = "0,-45,135,60,30,0\n0,-45,135,60,0.3,0\n0,-45,135,120,0.3,0\n";
+    let run = run(&folder, &format!("{JOINTS}{rows}"), &["--json"]);
+    let leads = |row: usize| run.json()["commands"][row]["pose_leads_to_q"].as_bool().expect("a truth");
+    assert!(leads(0) && !leads(1) && !leads(2), "{}", run.transcript());
+    assert!(run.stderr.contains("targets.csv:3: of 2 commands, this one the first"), "{}", run.transcript());
 }
 
 #[test]

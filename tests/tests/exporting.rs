@@ -50,7 +50,7 @@ fn survives_urdf(robot: &Robot) {
 }
 
 fn survives_a_urdf_with(robot: &Robot, zero: JointZero) {
-    let text = export(robot, Format::Urdf, zero).text;
+    let text = export(robot, Format::Urdf, zero).unwrap().text;
     let again = imported(&text, UrdfEnds::default()).unwrap_or_else(|error| panic!("{error}\n{text}")).robot;
     // xacro, and so our own reader, takes `$` for the beginning of something to compute.
     assert_eq!(again.name, robot.name.replace('$', "_"));
@@ -116,22 +116,62 @@ fn the_table_of_the_ur5e_is_the_one_that_its_maker_publishes() {
 
 #[test]
 fn nearly_parallel_axes_are_explained() {
-    let optimised = export(&Robot::open("puma560-optimised").unwrap(), Format::Dh, JointZero::Model);
+    let optimised = export(&Robot::open("puma560-optimised").unwrap(), Format::Dh, JointZero::Model).unwrap();
     assert!(
         optimised.remarks.iter().any(|remark| remark.contains("axes 2 and 3") && remark.contains("no fault")),
         "{optimised:?}"
     );
-    assert!(export(&Robot::open("puma560").unwrap(), Format::Dh, JointZero::Model).remarks.is_empty());
+    assert!(export(&Robot::open("puma560").unwrap(), Format::Dh, JointZero::Model).unwrap().remarks.is_empty());
 }
 
 #[test]
 fn a_name_that_no_reader_takes_is_cut_between_letters_and_that_is_said() {
     let mut robot = Robot::open("ur5e").unwrap();
     robot.name = "a".to_owned() + &"é".repeat(150);
-    let exported = export(&robot, Format::Urdf, JointZero::Model);
+    let exported = export(&robot, Format::Urdf, JointZero::Model).unwrap();
     assert!(exported.remarks.iter().any(|remark| remark.contains("longer than the 200 bytes")), "{:?}", exported.remarks);
     let name = imported(&exported.text, UrdfEnds::default()).unwrap().robot.name;
     assert_eq!(name, "a".to_owned() + &"é".repeat(99));
+}
+
+/// A file's robot of joints a hundredth of a degree from parallel, a link a joint and one for the tool.
+fn nearly_parallel(kinds: &str) -> Robot {
+    let link = "[[links]]\ntranslation_mm = [100.0, 50.0, 200.0]\nrotation_deg = [20.0, 0.01, 0.01]\n";
+    let joint = |kind| match kind {
+        'P' => "[[joints]]\ntype = \"prismatic\"\noffset_mm = 10.0\nscale = 1.0\nmin_mm = 0.0\nmax_mm = 400.0\n",
+        _ => "[[joints]]\ntype = \"revolute\"\noffset_deg = 5.0\nscale = 1.0\nmin_deg = -170.0\nmax_deg = 170.0\n",
+    };
+    let joints: String = kinds.chars().map(joint).collect();
+    Robot::parse(&Source::new(kinds, &(link.repeat(kinds.len() + 1) + &joints))).unwrap()
+}
+
+#[test]
+fn a_slide_nearly_parallel_to_its_neighbour_has_an_ordinary_table() {
+    // How many pairs stay far from one another: those of two revolute joints, and one beside a slide that was laid for its other side.
+    for (kinds, far) in [("RP", 0), ("PR", 0), ("PPR", 1), ("RPR", 1), ("RPPR", 1), ("RR", 1), ("PRRP", 1)] {
+        let robot = nearly_parallel(kinds);
+        for convention in [Convention::Standard, Convention::Modified] {
+            let table = DhTable::new(&robot.chain, convention);
+            let (off_m, turned_rad) = table.largest_difference(&robot.chain, &robot.limits);
+            assert!(off_m < 1e-9 && turned_rad < 1e-9, "{kinds} {convention:?}: {off_m:e} m, {turned_rad:e} rad");
+            assert_eq!(table.nearly_parallel.len(), far, "{kinds}: {table:?}");
+            let largest_m = table.rows.iter().map(|row| row.d_m.abs().max(row.a_m.abs())).fold(0.0, f64::max);
+            assert_eq!(largest_m > 10.0, far > 0, "{kinds}: {table:?}");
+        }
+    }
+}
+
+#[test]
+fn parameters_as_csv_are_the_numbers_of_the_robot_file() {
+    for (name, text) in ROBOTS {
+        let words = text.split(|c: char| !(c.is_ascii_digit() || "+-.e".contains(c)));
+        let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+        let csv = export(&Robot::open(name).unwrap(), Format::Csv, JointZero::Model).unwrap().text;
+        for line in csv.lines().skip_while(|line| *line != "parameter,unit,value").skip(1) {
+            let value: f64 = line.rsplit(',').next().unwrap().parse().unwrap();
+            assert!(numbers.contains(&value), "{name}: {line}");
+        }
+    }
 }
 
 const ODD_AXES: &str = r#"<robot name="odd">
@@ -191,6 +231,12 @@ fn hostile_files_are_refused_clearly() {
     let two = robot(&["a", "b"], &[joint("j", "a", "b")]);
     assert!(imported(&two, UrdfEnds::default()).is_ok());
 
+    let comment = two.replacen("<link", &format!("<!-- {} > \" --> don't <link", "don't xmlns ".repeat(500)), 1);
+    assert!(imported(&comment, UrdfEnds::default()).is_ok(), "a comment has no attributes");
+    let attributes: String = (0..201).map(|i| format!(" a{i}='>'")).collect();
+    let refused = refusal(&two.replacen("<link", &format!("<link{attributes}"), 1));
+    assert!(refused.starts_with("robot.urdf:2: ") && refused.contains("more than 200 attributes"), "{refused}");
+
     let bomb = format!("<!DOCTYPE r [<!ENTITY a \"{}\"><!ENTITY b \"&a;&a;&a;&a;\">]>\n{two}", "ha".repeat(1000));
     assert!(refusal(&bomb).contains("not XML that can be read"), "{}", refusal(&bomb));
     let long = robot(&["a", "b"], &[joint(&"n".repeat(100_000_000), "a", "b")]);
@@ -226,6 +272,12 @@ fn hostile_files_are_refused_clearly() {
         ("xyz=\"0 0 1\"", "xyz=\"0 0\"", "xyz of joint `j` is `0 0`"),
         ("xyz=\"0 0 1\"", "xyz=\"0 nan 1\"", "`0 nan 1`"),
         ("xyz=\"0 0 1\"", "xyz=\"0 1e99 1\"", "`0 1e99 1`"),
+        ("\"continuous\"><", "\"revolute\"><limit lower=\"-1e9\" upper=\"1e9\"/><", "a joint without limits is `continuous`"),
+        (
+            "\"continuous\"><",
+            "\"prismatic\"><limit lower=\"-1001\" upper=\"1\"/><",
+            "expected a number from -1000 to 1000, metres",
+        ),
         ("\"continuous\"", "\"planar\"", "type of joint `j` is `planar`"),
         ("\"continuous\"", "\"revolute\"", "<limit> of joint `j` is missing"),
         ("<axis", "<mimic joint=\"k\"/><axis", "joint `j` is moved along by another"),
@@ -243,9 +295,13 @@ fn large_files_take_no_long_time() {
     let begun = std::time::Instant::now();
     let deep = "<a>".repeat(150_000) + &"</a>".repeat(150_000);
     let attributes: String = (0..100_000).map(|i| format!(" a{i}=\"\"")).collect();
+    // What is no element may hold one quote.
+    let hidden = format!("<!-- ' --><?x ' ?><robot name=\"r\">'<![CDATA['<a ']]><a{attributes}/></robot>");
     let many_nodes = format!("<robot name=\"r\">{}</robot>", "<link name=\"a\"/>".repeat(300_000));
     let spaces: String = (0..60_000).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect();
-    for text in [format!("<robot name=\"r\">{deep}</robot>"), format!("<robot name=\"r\"{attributes}/>"), many_nodes, spaces] {
+    for text in
+        [format!("<robot name=\"r\">{deep}</robot>"), format!("<robot name=\"r\"{attributes}/>"), hidden, many_nodes, spaces]
+    {
         let refusal = refusal(&text);
         assert!(refusal.len() < 600, "{refusal}");
     }

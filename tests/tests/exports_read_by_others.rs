@@ -8,12 +8,15 @@ use std::process::{Command, Stdio};
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::exports::{joint_vectors, pose_by_command, write_calibrated};
 use ballbar_tests::readers::{is_skipped, octave, output, python, reader};
-use host_cal::files::Robot;
+use host_cal::files::{ROBOTS, Robot};
 use nalgebra::Matrix4;
 use tempfile::TempDir;
 
-/// A spherical wrist, axes that calibration leaves nearly parallel, a slide.
-const DESIGNS: [&str; 3] = ["puma560", "ur5e", "stanford"];
+/// A spherical wrist, axes that calibration leaves nearly parallel, a slide, few joints, and encoders that count against their joints.
+const DESIGNS: [&str; 5] = ["puma560", "ur5e", "stanford", "scara", BACKWARDS];
+
+/// A SCARA with every other scale below zero.
+const BACKWARDS: &str = "backwards.toml";
 
 /// A calibrated robot in a folder, with poses that the command computed.
 struct Bench {
@@ -26,7 +29,8 @@ struct Bench {
 impl Bench {
     fn new(design: &str) -> Self {
         let folder = TempDir::new().expect("a temporary folder");
-        let robot = write_calibrated(folder.path(), design);
+        let design = if design == BACKWARDS { write_backwards(folder.path()) } else { design.to_owned() };
+        let robot = write_calibrated(folder.path(), &design);
         let joints = joint_vectors(&robot, 7);
         let pose = |q: &Vec<f64>| pose_by_command(folder.path(), "calibrated.toml", &robot, q);
         let poses = joints.iter().map(pose).collect();
@@ -65,10 +69,44 @@ fn matrices(text: &str) -> Vec<Matrix4<f64>> {
     text.lines().map(|line| Matrix4::from_row_iterator(line.split_whitespace().map(number))).collect()
 }
 
-/// Matrices of JSON.
-fn json_matrices(text: &str) -> Vec<Matrix4<f64>> {
-    let rows: Vec<[[f64; 4]; 4]> = serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"));
-    rows.iter().map(|matrix| Matrix4::from_fn(|i, j| matrix[i][j])).collect()
+fn write_backwards(folder: &Path) -> String {
+    let (_, text) = ROBOTS.iter().find(|(name, _)| *name == "scara").expect("a built-in robot");
+    let mut joint = 0;
+    let turned = text.lines().map(|line| {
+        joint += usize::from(line.starts_with("scale ="));
+        if joint % 2 == 1 { line.replace("scale = 1.0", "scale = -1.0") + "\n" } else { format!("{line}\n") }
+    });
+    let path = folder.join(BACKWARDS);
+    fs::write(&path, turned.collect::<String>()).expect("a file");
+    path.display().to_string()
+}
+
+/// What Python says of a file.
+#[derive(serde::Deserialize)]
+struct ByPython {
+    poses: Vec<[[f64; 4]; 4]>,
+    limits: Option<Vec<Option<[f64; 2]>>>,
+}
+
+impl ByPython {
+    fn new(arguments: &[&Path]) -> Self {
+        let text = python("robot.py", arguments);
+        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"))
+    }
+
+    fn poses(&self) -> Vec<Matrix4<f64>> {
+        self.poses.iter().map(|matrix| Matrix4::from_fn(|i, j| matrix[i][j])).collect()
+    }
+
+    /// A file without limits and a joint without any hold.
+    fn has_limits_of(&self, robot: &Robot, what: &str) {
+        let Some(limits) = &self.limits else { return };
+        assert_eq!(limits.len(), robot.limits.len(), "{what}");
+        for (ours, theirs) in robot.limits.iter().zip(limits) {
+            let Some([min, max]) = theirs else { continue };
+            assert!((ours.min - min).abs() < 1e-12 && (ours.max - max).abs() < 1e-12, "{what}: {ours:?}, {theirs:?}");
+        }
+    }
 }
 
 #[test]
@@ -84,8 +122,11 @@ fn python_computes_the_same_poses_from_every_file_of_data() {
             bench.export(format, "exported", more);
             let paths = [Path::new(format), &bench.path("exported"), &bench.path("joints.json")];
             // Distances of hundreds of metres cost three digits.
-            let tolerance = if design == "ur5e" && format.ends_with("dh") { 1e-9 } else { 1e-11 };
-            bench.holds(&format!("{design} {format} {more:?}"), &json_matrices(&python("robot.py", &paths)), tolerance);
+            let tolerance = if !["puma560", "stanford"].contains(&design) && format.ends_with("dh") { 1e-9 } else { 1e-11 };
+            let (what, theirs) = (format!("{design} {format} {more:?}"), ByPython::new(&paths));
+            assert_eq!(theirs.limits.is_some(), !format.ends_with("dh"), "{what}");
+            theirs.has_limits_of(&bench.robot, &what);
+            bench.holds(&what, &theirs.poses(), tolerance);
         }
     }
 }
@@ -163,8 +204,9 @@ fn imported_descriptions_have_the_kinematics_that_pythons_parser_finds() {
         let joints_path = folder.path().join("joints.json");
         fs::write(&joints_path, serde_json::to_string(&joints).expect("JSON")).expect("a file");
         let arguments = [Path::new("urdf"), &urdf, &joints_path, Path::new(base), Path::new(tip)];
-        let theirs = json_matrices(&python("robot.py", &arguments));
-        for (q, theirs) in joints.iter().zip(theirs) {
+        let theirs = ByPython::new(&arguments);
+        theirs.has_limits_of(&robot, file);
+        for (q, theirs) in joints.iter().zip(theirs.poses()) {
             let off = (pose_by_command(folder.path(), "imported.toml", &robot, q) - theirs).amax();
             assert!(off < 1e-12, "{file} {tip}: {off:e} at {q:?}");
         }

@@ -220,6 +220,35 @@ fn the_command_shows_what_is_wrong_with_a_mutant_without_a_panic() {
 }
 
 #[test]
+fn a_robots_name_is_a_line_of_a_screen_and_a_file_of_no_end_is_not_read_to_it() {
+    let long = "n".repeat(201);
+    let text = |name: &str| format!("name = {name}\n{}", ROBOT.split_once('\n').expect("a name").1);
+    for (name, says) in [
+        ("\"\\u001b[31mred\"", "robot.toml:1: `name` is ` [31mred`, 8 bytes long"),
+        ("\"one\\ntwo\"", "robot.toml:1: `name` is `one two`, 7 bytes long"),
+        (&format!("\"{long}\""), "201 bytes long, expected at most 200 bytes"),
+        ("\"\u{1b}[31mred\"", "robot.toml:1: "),
+        (&format!("\"{}\"", "n".repeat(1 << 20)), "robot.toml: longer than 1048576 bytes"),
+    ] {
+        let bench = Workbench::new();
+        bench.put("robot.toml", text(name));
+        let run = bench.run(&["fk", "--robot", "robot.toml", "--q", "0,0"]);
+        // Long messages are broken into lines.
+        let said = run.stderr.replace("\n  │ ", " ");
+        assert!(run.code == 2 && said.contains(says) && said.len() < 2_000, "{says}: {}", run.transcript());
+        assert!(!run.stderr.contains('\u{1b}'), "{:?}", run.stderr);
+    }
+    assert!(Robot::parse(&Source::new("robot", &text("\"\u{2028} é\""))).is_ok());
+    #[cfg(unix)]
+    for arguments in
+        [&["fk", "--robot", "/dev/zero", "--q", "0,0"][..], &["compensate", "--robot", "ur5e", "--nominal", "ur5e", "/dev/zero"]]
+    {
+        let run = Workbench::new().run(arguments);
+        assert!(run.code == 2 && run.stderr.contains("/dev/zero: longer than"), "{}", run.transcript());
+    }
+}
+
+#[test]
 fn a_set_that_needs_quotes_is_written_with_them() {
     let (robot, rig) = good();
     for set in ["left, then right", "the \"second\" one", "# 2"] {

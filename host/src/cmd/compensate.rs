@@ -12,7 +12,7 @@ use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use super::table::{Columns, fixed};
-use crate::files::{Robot, Source, Target, compensated_csv, read_targets};
+use crate::files::{MOST_TARGET_BYTES, Robot, Source, Target, compensated_csv, read_targets};
 use crate::kinematics::{Compensation, Compensator, link_angles};
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 
@@ -75,6 +75,8 @@ struct CommandLine {
     before_deg: f64,
     left_mm: f64,
     left_deg: f64,
+    /// Whether the nominal model's nearest solution for the pose is `q`.
+    pose_leads_to_q: bool,
 }
 
 #[derive(Serialize)]
@@ -91,7 +93,7 @@ impl CompensateArgs {
         }
         let compensator = Compensator::new(&robot, &nominal)?;
         let start = self.start(&nominal, &compensator)?;
-        let targets = read_targets(&Source::read(&self.targets)?, &nominal)?;
+        let targets = read_targets(&Source::read_at_most(&self.targets, MOST_TARGET_BYTES)?, &nominal)?;
         let (done, not_reached) = compensated(&robot, &compensator, &targets, start);
         let warnings = self.warnings(&robot, &done, &not_reached);
         warnings.iter().for_each(|warning| warn(warning));
@@ -125,14 +127,24 @@ impl CompensateArgs {
         }
         warnings.extend(not_reached.iter().map(|missed| format!("{}: {}", place(missed.line), missed.why)));
         for (line, found) in done {
-            if let Some((joint, turn_rad)) = far_turn(robot, found) {
+            if let Some((joint, unit, turn)) = far_turn(robot, found) {
                 warnings.push(format!(
-                    "{}: joint {joint} turns by {:.1} degrees from where the controller's model has it: the arm is nearly singular there, \
+                    "{}: joint {joint} goes {:.1} {} from where the controller's model has it: the arm is nearly singular there, \
                      or on another branch",
                     place(*line),
-                    turn_rad.to_degrees()
+                    unit.from_si(turn),
+                    unit.name()
                 ));
             }
+        }
+        let elsewhere: Vec<usize> = done.iter().filter(|(_, found)| !found.pose_leads_to_q).map(|(line, _)| *line).collect();
+        if let Some(first) = elsewhere.first() {
+            warnings.push(format!(
+                "{}: of {} commands, this one the first, the pose has other joints near where the controller's model has it: command the \
+                 joints, since `left` holds for them alone",
+                place(*first),
+                elsewhere.len()
+            ));
         }
         warnings
     }
@@ -158,6 +170,7 @@ impl CompensateArgs {
             before_deg: found.before.1.to_degrees(),
             left_mm: mm_from_m(found.left.0),
             left_deg: found.left.1.to_degrees(),
+            pose_leads_to_q: found.pose_leads_to_q,
         };
         let commands: Vec<CommandLine> = done.iter().map(line).collect();
         let largest = |of: fn(&CommandLine) -> f64| commands.iter().map(of).fold(0.0, f64::max);
@@ -195,17 +208,20 @@ fn compensated(
     (done, not_reached)
 }
 
-/// The joint that turns farthest from where the controller would have it, and by how much, radians, if that is far.
-fn far_turn(robot: &Robot, found: &Compensation) -> Option<(usize, f64)> {
-    /// Five degrees: more than any calibration moves a joint by, away from singular postures.
+/// The joint that goes farthest from where the controller would have it, and how far, in its unit of SI, if that is far.
+fn far_turn(robot: &Robot, found: &Compensation) -> Option<(usize, ScreenUnit, f64)> {
+    /// Five degrees, or fifty millimetres: more than any calibration moves a joint by, away from singular postures.
     const FAR_RAD: f64 = std::f64::consts::PI / 36.0;
-    let turns = found.q.as_array().iter().zip(found.nominal_q.as_array()).map(|(new, old)| (new - old).abs());
-    let joints = turns.zip(robot.chain.joint_kinds()).enumerate().filter(|(_, (_, kind))| **kind == JointKind::Revolute);
-    let farthest = joints.max_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(i, (turn_rad, _))| (i + 1, turn_rad));
-    farthest.filter(|(_, turn_rad)| *turn_rad > FAR_RAD)
+    const FAR_M: f64 = 0.05;
+    let ways = found.q.as_array().iter().zip(found.nominal_q.as_array()).map(|(new, old)| (new - old).abs());
+    let joints = ways.zip(robot.chain.joint_kinds()).enumerate().map(|(i, (way, &kind))| {
+        let far = if kind == JointKind::Revolute { FAR_RAD } else { FAR_M };
+        (way / far, (i + 1, ScreenUnit::from(kind), way))
+    });
+    joints.filter(|(share, _)| *share > 1.0).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, farthest)| farthest)
 }
 
-/// Joints as a file has them: to the nanodegree and the nanometre.
+/// Joints as a file has them: to the nanodegree and the picometre.
 fn as_written(robot: &Robot, mut q: JointVector<f64>) -> JointVector<f64> {
     const PER_UNIT: f64 = 1e9;
     for (value, &kind) in q.as_array_mut().iter_mut().zip(robot.chain.joint_kinds()) {

@@ -77,7 +77,7 @@ impl ExportArgs {
             return Err(NoUrdf.into());
         }
         let robot = Robot::open(&self.robot)?;
-        let exported = export(&robot, self.format, self.joint_zero.unwrap_or_default());
+        let exported = export(&robot, self.format, self.joint_zero.unwrap_or_default())?;
         for remark in &exported.remarks {
             warn(remark);
         }

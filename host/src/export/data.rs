@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{MODEL, model_lines, origin};
 use crate::files::Robot;
-use crate::units::ScreenUnit;
+use crate::units::{ScreenUnit, as_in_a_file};
 
 /// A robot for JSON and YAML, metres and radians.
 #[derive(Serialize)]
@@ -66,9 +66,8 @@ impl<'a> RobotData<'a> {
     }
 }
 
-pub(super) fn json(robot: &Robot) -> String {
-    // Numbers are finite and keys are texts: nothing of this can fail to be written.
-    serde_json::to_string_pretty(&RobotData::new(robot)).unwrap_or_default() + "\n"
+pub(super) fn json(robot: &Robot) -> Result<String, serde_json::Error> {
+    Ok(serde_json::to_string_pretty(&RobotData::new(robot))? + "\n")
 }
 
 /// YAML in blocks.
@@ -114,12 +113,12 @@ pub(super) fn csv(robot: &Robot) -> String {
     for (i, &value) in robot.chain.parameters().iter().enumerate() {
         let parameter = Parameter::from_index(i);
         let unit = ScreenUnit::from(robot.chain.unit(parameter));
-        let _ = writeln!(text, "{parameter},{},{:?}", unit.name(), unit.from_si(value));
+        let _ = writeln!(text, "{parameter},{},{:?}", unit.name(), as_in_a_file(unit, value));
     }
     for (i, (limits, &kind)) in robot.limits.iter().zip(robot.chain.joint_kinds()).enumerate() {
         let unit = ScreenUnit::from(kind);
         for (name, value) in [("min", limits.min), ("max", limits.max)] {
-            let _ = writeln!(text, "{name}{},{},{:?}", i + 1, unit.name(), unit.from_si(value));
+            let _ = writeln!(text, "{name}{},{},{:?}", i + 1, unit.name(), as_in_a_file(unit, value));
         }
     }
     text

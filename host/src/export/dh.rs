@@ -17,15 +17,22 @@ pub(super) fn exported(robot: &Robot, convention: Convention) -> Exported {
         let (first, second) = (pair.joint, pair.joint + 1);
         let largest_m = [first, second].iter().filter_map(|&i| table.rows.get(i - 1)).fold(0.0_f64, |d_m, row| d_m.max(row.d_m.abs()));
         format!(
-            "axes {first} and {second} are {:.4} degrees from parallel, so their common normal is far away and d{first} and d{second} are \
+            "axes {first} and {second} are {} degrees from parallel, so their common normal is far away and d{first} and d{second} are \
              large (up to {:.1} mm). That is no fault of the calibration but of Denavit-Hartenberg tables: a URDF has no such values",
-            pair.angle_rad.to_degrees(),
+            angle_text(pair.angle_rad.to_degrees()),
             mm_from_m(largest_m)
         )
     });
     let remarks: Vec<String> = remarks.collect();
     let text = text(robot, &table, difference, &remarks);
     Exported { text, remarks, largest_difference: Some(difference), nearly_parallel: table.nearly_parallel }
+}
+
+/// Four decimals, or as many as show the number.
+fn angle_text(deg: f64) -> String {
+    /// What four decimals show as zero.
+    const LEAST_DEG: f64 = 5e-5;
+    if deg < LEAST_DEG { format!("{deg:.1e}") } else { format!("{deg:.4}") }
 }
 
 /// What a reader of the text gets: the difference to the robot is that of the file.

@@ -5,6 +5,9 @@ mod data;
 mod dh;
 mod urdf;
 
+use miette::Diagnostic;
+use thiserror::Error;
+
 use crate::files::Robot;
 use crate::kinematics::{Convention, NearlyParallel};
 
@@ -60,21 +63,30 @@ pub struct Exported {
     pub nearly_parallel: Vec<NearlyParallel>,
 }
 
+/// A robot that JSON cannot hold.
+#[derive(Debug, Error, Diagnostic)]
+#[error("the robot cannot be written as JSON: {0}")]
+#[diagnostic(help("Every robot that was read can be: this is a fault of the program. Another --format may do meanwhile."))]
+pub struct NoJson(#[from] serde_json::Error);
+
 /// Writes a robot in a format; `zero` is for those that hold a URDF.
-pub fn export(robot: &Robot, format: Format, zero: JointZero) -> Exported {
+///
+/// # Errors
+/// [`NoJson`] of JSON alone.
+pub fn export(robot: &Robot, format: Format, zero: JointZero) -> Result<Exported, NoJson> {
     let exact = |text| Exported { text, remarks: Vec::new(), largest_difference: None, nearly_parallel: Vec::new() };
-    match format {
+    Ok(match format {
         Format::Urdf => Exported { remarks: urdf::remarks(robot, zero), ..exact(urdf::text(robot, zero)) },
         Format::Ros2 => Exported { remarks: urdf::remarks(robot, zero), ..exact(urdf::ros2_parameters(robot, zero)) },
         Format::Dh => dh::exported(robot, Convention::Standard),
         Format::Mdh => dh::exported(robot, Convention::Modified),
-        Format::Json => exact(data::json(robot)),
+        Format::Json => exact(data::json(robot)?),
         Format::Yaml => exact(data::yaml(robot)),
         Format::Csv => exact(data::csv(robot)),
         Format::C => exact(code::c_header(robot)),
         Format::Rust => exact(code::rust_constants(robot)),
         Format::Octave => exact(code::octave_function(robot)),
-    }
+    })
 }
 
 /// A robot's name with nothing that could end a comment or a quoted text, or go on on another line.

@@ -26,7 +26,7 @@ pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{Calibration, EncoderFacts, JointLimits, MOST_NAME_BYTES, NoEncoders, Robot};
 pub use solids::Solids;
 pub use source::{InputError, Source};
-pub use targets::{Goal, Target, compensated_csv, read_targets};
+pub use targets::{Goal, MOST_TARGET_BYTES, Target, compensated_csv, pose_as_written, read_targets};
 pub use urdf::{ENCODER_ELEMENT, Imported, UrdfEnds, parse_urdf, read_urdf};
 pub(crate) use write::{PendingFile, commit_all};
 pub use write::{WriteError, check_writable, write_atomically, write_atomically_with};

@@ -3,13 +3,15 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::problem::Problem;
+use super::problem::{Problem, short};
 use super::source::{InputError, Source};
 
 /// Reads a TOML text into its serde form.
 pub(super) fn deserialize<T: for<'de> Deserialize<'de>>(source: &Source) -> Result<T, InputError> {
+    /// A key of the file may be in it.
+    const SHOWN: usize = 500;
     toml::from_str(source.text()).map_err(|error| {
-        let problem = Problem::Toml(error.message().replace('\n', ", "));
+        let problem = Problem::Toml(short(&error.message().replace('\n', ", "), SHOWN));
         match error.span() {
             Some(span) => InputError::at(source, span, problem),
             None => InputError::of_file(source.name(), problem),

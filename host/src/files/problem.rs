@@ -20,6 +20,14 @@ pub enum Problem {
     /// Not TOML, an unknown or missing key, or a value of the wrong type; in the parser's words.
     #[error("{0}")]
     Toml(String),
+    /// A robot's name that is no line of a screen.
+    #[error("`name` is `{found}`, {bytes} bytes long, expected at most 200 bytes without control characters")]
+    RobotName {
+        /// The name, as far as a message can show it.
+        found: String,
+        /// Its length.
+        bytes: usize,
+    },
     /// A robot needs 1 to 8 joints.
     #[error("{found} joints, expected 1 to 8")]
     JointCount {
@@ -264,6 +272,7 @@ impl Problem {
             Self::JointColumns { found: 0, header, .. } => {
                 return Some(format!("The first line must be the header, parted by commas: {header}."));
             }
+            Self::RobotName { .. } => "Screens and files of others show the name: write a short one, on one line.",
             Self::Toml(_) => "The keys and their units are in docs/files.md.",
             Self::JointCount { .. } | Self::LinkCount { .. } => "A chain is link 1, joint 1, link 2, … joint J, link J+1.",
             Self::JointUnit { .. } | Self::ColumnUnit { .. } => "Angles are in degrees (`_deg`), slides in millimetres (`_mm`).",
@@ -283,7 +292,7 @@ impl Problem {
             Self::NoRows("targets") => "Write a target a line below the header.",
             Self::NoRows(_) => "Was the recording stopped before the first pose settled?",
             Self::Word { .. } => return None,
-            Self::TooLong { .. } => "Robot descriptions are far shorter; is it the right file?",
+            Self::TooLong { .. } => "Files of its kind are far shorter; is it the right file?",
             Self::Xml(_) => {
                 "A URDF file is needed, without DOCTYPE and entities; expand a xacro file first: xacro robot.xacro > robot.urdf"
             }
@@ -301,4 +310,13 @@ impl Problem {
         };
         Some(help.to_owned())
     }
+}
+
+/// At most so many characters of a text, with spaces for what a terminal would obey.
+pub(super) fn short(text: &str, most: usize) -> String {
+    let mut shown: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(most).collect();
+    if text.chars().nth(most).is_some() {
+        shown.push('…');
+    }
+    shown
 }

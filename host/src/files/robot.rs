@@ -14,7 +14,7 @@ use toml_edit::{DocumentMut, Item, Table, value};
 
 use super::builtin::ROBOTS;
 use super::numbers::{Range as Of, deserialize, in_range, vector};
-use super::problem::Problem;
+use super::problem::{Problem, short};
 use super::source::{InputError, Source};
 use crate::units::{ScreenUnit, m_from_mm, tidy};
 
@@ -99,7 +99,7 @@ pub struct Calibration {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RobotToml {
-    name: Option<String>,
+    name: Option<Spanned<String>>,
     links: Vec<LinkToml>,
     joints: Vec<Spanned<JointToml>>,
     calibration: Option<Calibration>,
@@ -214,7 +214,10 @@ impl Robot {
             }
         }
         let chain = Chain::new(&kinds, &parameters).map_err(|error| of_file(Problem::Toml(error.to_string())))?;
-        let name = file.name.unwrap_or_else(|| source.name().to_owned());
+        let name = match &file.name {
+            Some(name) => robot_name(source, name)?,
+            None => source.name().to_owned(),
+        };
         Ok(Self { name, chain, limits, encoders, calibration: file.calibration, source: source.clone() })
     }
 
@@ -264,6 +267,17 @@ impl Robot {
         let text = document.to_string();
         Ok(if text.starts_with(CALIBRATED_NOTE) { text } else { format!("{CALIBRATED_NOTE}{text}") })
     }
+}
+
+/// A name that fits a line.
+fn robot_name(source: &Source, name: &Spanned<String>) -> Result<String, InputError> {
+    const SHOWN: usize = 80;
+    let text = name.as_ref();
+    if text.len() > MOST_NAME_BYTES || text.contains(char::is_control) {
+        let problem = Problem::RobotName { found: short(text, SHOWN), bytes: text.len() };
+        return Err(InputError::at(source, name.span(), problem));
+    }
+    Ok(text.clone())
 }
 
 /// Joint `i` of a file, being checked.

@@ -24,7 +24,7 @@ impl Source {
         Self { name: name.into(), text: text.replace("\r\n", "\n").replace('\r', "\n").into() }
     }
 
-    /// Reads a file.
+    /// Reads a file, however long: of poses, or of plans.
     ///
     /// # Errors
     /// [`Problem::Unreadable`] when it cannot be opened or is not UTF-8.
@@ -48,15 +48,17 @@ impl Source {
         if bytes.len() as u64 > most_bytes {
             return Err(InputError::of_file(&name, Problem::TooLong { most_bytes }));
         }
-        let text = String::from_utf8(bytes).map_err(|error| unreadable(error.to_string()))?;
+        let text = std::io::read_to_string(bytes.as_slice()).map_err(|error| unreadable(error.to_string()))?;
         Ok(Self::new(&name, &text))
     }
 
-    /// Takes a built-in of that name, or else reads the file of that name.
+    /// Takes a built-in of that name, or else reads the file of that name, of a mebibyte at most.
     ///
     /// # Errors
-    /// [`Problem::NoSuchFile`] with the built-in names when there is neither, or as [`Source::read`].
+    /// [`Problem::NoSuchFile`] with the built-in names when there is neither, or as [`Source::read_at_most`].
     pub fn named_or_read(argument: &str, builtins: &[(&str, &str)], what: &'static str) -> Result<Self, InputError> {
+        /// A hundred times what the longest robot or rig has.
+        const MOST_BYTES: u64 = 1 << 20;
         if let Some((name, text)) = builtins.iter().find(|(name, _)| *name == argument) {
             return Ok(Self::new(&format!("{name} (built in)"), text));
         }
@@ -65,7 +67,7 @@ impl Source {
             let names = builtins.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
             return Err(InputError::of_file(argument, Problem::NoSuchFile { what, builtins: names }));
         }
-        Self::read(path)
+        Self::read_at_most(path, MOST_BYTES)
     }
 
     /// What to call it in messages.
@@ -102,7 +104,7 @@ impl InputError {
     /// A problem at some bytes of a text.
     pub(super) fn at(source: &Source, span: Range<usize>, problem: Problem) -> Self {
         let place = format!("{}:{}", source.name(), source.line_of(span.start));
-        let show = || (NamedSource::new(source.name(), source.text().to_owned()), span.clone());
+        let show = || (NamedSource::new(source.name(), as_shown(source.text())), span.clone());
         Self { place, problem: Box::new(problem), at: can_be_shown(source.text(), &span).then(|| Box::new(show())) }
     }
 
@@ -110,6 +112,18 @@ impl InputError {
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
+}
+
+/// A text of the same length in bytes, with nothing in it that a terminal would obey.
+fn as_shown(text: &str) -> String {
+    let shown = |c: char| match (c, c.len_utf8()) {
+        ('\n' | '\t', _) => c,
+        (c, 1) if c.is_control() => '?',
+        // Of the control characters of two bytes, one of two.
+        (c, _) if c.is_control() => '·',
+        (c, _) => c,
+    };
+    text.chars().map(shown).collect()
 }
 
 /// Whether the lines around a span fit a screen: a file of one line a megabyte long is not to be printed.

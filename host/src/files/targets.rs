@@ -28,7 +28,13 @@ pub enum Goal {
     Pose(Pose<f64>, Option<JointVector<f64>>),
 }
 
+/// Longer files of targets are not read: a million rows fit in.
+pub const MOST_TARGET_BYTES: u64 = 128 << 20;
+
 const POSE: [&str; 6] = ["x_mm", "y_mm", "z_mm", "alpha_deg", "beta_deg", "gamma_deg"];
+const MM_DECIMALS: usize = 6;
+/// A turn of a nanodegree moves what is a metre away by less than a nanometre.
+const DEG_DECIMALS: usize = 9;
 
 /// Reads a file of targets: the robot's joint columns, or all six of `x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg`, or both.
 ///
@@ -67,6 +73,13 @@ pub fn read_targets(source: &Source, robot: &Robot) -> Result<Vec<Target>, Input
     Ok(targets)
 }
 
+/// A pose as a file of commands has it: to the nanometre and the nanodegree.
+pub fn pose_as_written(pose: &Pose<f64>) -> Pose<f64> {
+    let rounded = |value: f64, decimals: i32| (value * 10_f64.powi(decimals)).round() / 10_f64.powi(decimals);
+    let translation_m = pose.translation_m.map(|m| m_from_mm(rounded(mm_from_m(m), MM_DECIMALS as i32)));
+    from_link(translation_m, link_angles(&pose.rotation).map(|rad| rounded(rad.to_degrees(), DEG_DECIMALS as i32).to_radians()))
+}
+
 /// Commands as a file: the target's line, joints to command, the pose that the controller believes to reach by them, and the
 /// predicted errors.
 pub fn compensated_csv(robot: &Robot, commands: &[(usize, Compensation)]) -> String {
@@ -80,9 +93,8 @@ pub fn compensated_csv(robot: &Robot, commands: &[(usize, Compensation)]) -> Str
         let pose = &found.nominal_base_from_tool;
         let mut fields = vec![line.to_string()];
         fields.extend(kinds.iter().zip(found.q.as_array()).map(|(&kind, &q)| fixed(ScreenUnit::from(kind).from_si(q), 9)));
-        fields.extend(pose.translation_m.iter().map(|&m| fixed(mm_from_m(m), 6)));
-        // A turn of a nanodegree moves what is a metre away by less than a nanometre.
-        fields.extend(link_angles(&pose.rotation).iter().map(|angle| fixed(angle.to_degrees(), 9)));
+        fields.extend(pose.translation_m.iter().map(|&m| fixed(mm_from_m(m), MM_DECIMALS)));
+        fields.extend(link_angles(&pose.rotation).iter().map(|angle| fixed(angle.to_degrees(), DEG_DECIMALS)));
         for (off_m, turned_rad) in [found.before, found.left] {
             fields.extend([fixed(mm_from_m(off_m), 6), fixed(turned_rad.to_degrees(), 6)]);
         }

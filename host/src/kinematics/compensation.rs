@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use super::branches::{InverseKinematics, Thoroughness};
 use super::frames::apart;
-use crate::files::{Goal, JointLimits, Robot};
+use crate::files::{Goal, JointLimits, Robot, pose_as_written};
 use crate::units::{ScreenUnit, tidy};
 
 /// A calibrated robot beside the model that its controller has.
@@ -37,6 +37,9 @@ pub struct Compensation {
     pub before: (f64, f64),
     /// From the target, if it goes to `q`.
     pub left: (f64, f64),
+    /// Whether the nominal model's solution for that pose, as a file has it, that is nearest to `nominal_q` is `q`. Near singular
+    /// postures a pose may have other joints, and then `left` is not what becomes of the pose.
+    pub pose_leads_to_q: bool,
 }
 
 /// A joint of which the two robots allow nothing in common.
@@ -137,6 +140,8 @@ impl Compensator {
         before: &JointVector<f64>,
         rounded: impl Fn(JointVector<f64>) -> JointVector<f64>,
     ) -> Result<Compensation, Unreached> {
+        /// Radians and metres: a hundredth of a millimetre a metre away.
+        const SAME_JOINTS: f64 = 1e-5;
         let (wanted, nominal_q) = match *goal {
             Goal::Joints(q) => (self.nominal_forward.base_from_tool(&q), q),
             Goal::Pose(pose, near) => (pose, self.nominal_joints(&pose, &near.unwrap_or(*before)).ok_or(Unreached::ByNominal)?),
@@ -148,10 +153,13 @@ impl Compensator {
         let q = rounded(q.ok_or(Unreached::ByCalibrated)?);
         self.check_limits(&q)?;
         let from_target = |q: &JointVector<f64>| apart(&wanted, &self.calibrated.skeleton().at(q).base_from_tool);
+        let nominal_base_from_tool = self.nominal_forward.base_from_tool(&q);
+        let by_controller = self.nominal_joints(&pose_as_written(&nominal_base_from_tool), &nominal_q);
         Ok(Compensation {
             q,
             nominal_q,
-            nominal_base_from_tool: self.nominal_forward.base_from_tool(&q),
+            nominal_base_from_tool,
+            pose_leads_to_q: by_controller.is_some_and(|by_controller| distance(&by_controller, &q) < SAME_JOINTS),
             before: from_target(&nominal_q),
             left: from_target(&q),
         })

@@ -7,8 +7,11 @@
 //! - standard: row i is `Rz(theta_i) · Trans_z(d_i) · Trans_x(a_i) · Rx(alpha_i)`
 //! - modified (J. J. Craig, "Introduction to Robotics"): row i is `Rx(alpha_(i-1)) · Trans_x(a_(i-1)) · Rz(theta_i) · Trans_z(d_i)`
 //!
-//! Before the first row and behind the last one stand whole transforms, so that any chain has a table. Where two axes are nearly
-//! parallel their common normal is far away, and d of both runs away with it.
+//! The line of a revolute axis is given. A prismatic axis has a direction but no place: where it is nearly parallel to a neighbour, its line
+//! is laid so that the two meet near by, and d and a stay ordinary numbers.
+//!
+//! Before the first row and behind the last one stand whole transforms, so that any chain has a table. Where two other axes are
+//! nearly parallel their common normal is far away, and d of both runs away with it.
 
 use ballbar::{Chain, JointKind, JointVector, Kinematics, Matrix3, Pose, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -92,7 +95,9 @@ impl DhTable {
     /// The table of a chain.
     pub fn new(chain: &Chain<f64>, convention: Convention) -> Self {
         let posture = Skeleton::new(chain).at(&JointVector::zero());
-        let axes = posture.axes();
+        let mut axes = posture.axes().to_vec();
+        let mut far = nearly_parallel(&axes);
+        bring_near(&mut axes, 0, &Vector3::zeros(), &mut far);
         let Some(first) = axes.first() else {
             let nothing = from_link(Vector3::zeros(), [0.0; 3]);
             let ends = (nothing, posture.base_from_tool);
@@ -105,15 +110,20 @@ impl DhTable {
             };
         };
         let begin = begin(first);
-        let normals: Vec<Normal> = axes.windows(2).scan(begin, |last, pair| Some(next(last, &pair[0], &pair[1]))).collect();
+        let (mut normals, mut last) = (Vec::new(), begin);
+        for i in 1..axes.len() {
+            bring_near(&mut axes, i, &last.to_m, &mut far);
+            last = next(&last, &axes[i - 1], &axes[i]);
+            normals.push(last);
+        }
         let table = Self {
             convention,
-            base_from_first: begin.frame(&first.direction),
+            base_from_first: begin.frame(&axes[0].direction),
             rows: Vec::new(),
             last_from_tool: posture.base_from_tool,
-            nearly_parallel: nearly_parallel(axes),
+            nearly_parallel: far,
         };
-        table.with_rows(axes, begin, &normals).closed()
+        table.with_rows(&axes, begin, &normals).closed()
     }
 
     fn with_rows(mut self, axes: &[Axis], begin: Normal, normals: &[Normal]) -> Self {
@@ -220,7 +230,7 @@ fn row(axis: &Axis, last: &Normal, normal: &Normal, (a_m, alpha_rad): (f64, f64)
 }
 
 /// The common normal of two axes; of parallel ones the one that begins where the last ended.
-fn next(last: &mut Normal, axis: &Axis, other: &Axis) -> Normal {
+fn next(last: &Normal, axis: &Axis, other: &Axis) -> Normal {
     let (z, w) = (axis.direction, other.direction);
     let cross = z.cross(&w);
     let (direction, from_m, to_m) = if cross.norm() > PARALLEL_RAD {
@@ -237,9 +247,24 @@ fn next(last: &mut Normal, axis: &Axis, other: &Axis) -> Normal {
     };
     let direction = facing(direction, &last.direction, &(to_m - from_m));
     let a_m = (to_m - from_m).dot(&direction);
-    let normal = Normal { direction, from_m, to_m, a_m, alpha_rad: cross.dot(&direction).atan2(z.dot(&w)) };
-    *last = normal;
-    normal
+    Normal { direction, from_m, to_m, a_m, alpha_rad: cross.dot(&direction).atan2(z.dot(&w)) }
+}
+
+/// Lays the line of a prismatic axis: through the foot that the last normal has on the axis before where it is nearly parallel to that one,
+/// else, where it is nearly parallel to the axis behind it, through that one's point nearest to the foot. The pair is then not far.
+fn bring_near(axes: &mut [Axis], i: usize, foot_m: &Vector3<f64>, far: &mut Vec<NearlyParallel>) {
+    let Some(axis) = axes.get(i).filter(|axis| axis.kind == JointKind::Prismatic) else { return };
+    let is_far = |first: usize| far.iter().any(|pair| pair.joint == first + 1);
+    let (pair, point_m) = match (i.checked_sub(1).filter(|&before| is_far(before)), axes.get(i + 1)) {
+        (Some(before), _) => (before, *foot_m),
+        // A prismatic axis behind it will be laid itself.
+        (None, Some(behind)) if is_far(i) && behind.kind == JointKind::Revolute => {
+            (i, behind.point_m + behind.direction * behind.direction.dot(&(foot_m - behind.point_m)))
+        }
+        _ => return,
+    };
+    axes[i] = Axis { point_m, ..*axis };
+    far.retain(|other| other.joint != pair + 1);
 }
 
 /// A normal's direction or its opposite: as the last normal points, so that a calibrated table is like its design's, where the two are not

@@ -36,7 +36,7 @@ pub(super) fn imported(source: &Source, urdf: &UrdfRobot<'_>, path: &Path<'_>) -
         let turn = z_to(&axis);
         links.push(compose(&pending, &turn));
         pending = Pose { rotation: turn.rotation.transpose(), translation_m: Vector3::zeros() };
-        let encoder = joint.encoder(source)?.unwrap_or(EncoderModel { offset: 0.0, scale: 1.0 });
+        let encoder = joint.encoder(source, kind)?.unwrap_or(EncoderModel { offset: 0.0, scale: 1.0 });
         let (a, b) = match limits {
             Limits::Between(lower, upper) => ((lower - encoder.offset) / encoder.scale, (upper - encoder.offset) / encoder.scale),
             Limits::None => {

@@ -6,12 +6,12 @@ use ballbar::{JointKind, Pose, Vector3};
 use roxmltree::{Document, Node};
 
 use super::super::numbers::Range as Of;
-use super::super::problem::Problem;
+use super::super::problem::{self, Problem};
 use super::super::robot::MOST_NAME_BYTES;
 use super::super::source::{InputError, Source};
 use super::ENCODER_ELEMENT;
 use crate::kinematics::from_link;
-use crate::units::mm_from_m;
+use crate::units::{ScreenUnit, mm_from_m};
 
 /// Everything that the chain may need.
 pub(super) struct UrdfRobot<'a> {
@@ -55,11 +55,7 @@ pub(super) struct EncoderModel {
 /// A text cut to what a message can show.
 pub(super) fn short(text: &str) -> String {
     const SHOWN: usize = 80;
-    let mut shown: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(SHOWN).collect();
-    if text.chars().nth(SHOWN).is_some() {
-        shown.push('…');
-    }
-    shown
+    problem::short(text, SHOWN)
 }
 
 /// The names and ends of all links and joints; what else a joint holds is read when it is on the chain.
@@ -127,10 +123,10 @@ impl UrdfJoint<'_> {
     }
 
     /// Our own element; `None` in the files of others.
-    pub(super) fn encoder(&self, source: &Source) -> Result<Option<EncoderModel>, InputError> {
+    pub(super) fn encoder(&self, source: &Source, kind: JointKind) -> Result<Option<EncoderModel>, InputError> {
         let Some(element) = self.child_element(ENCODER_ELEMENT) else { return Ok(None) };
-        let offset = self.number(source, element, "offset", |value| Of::Plausible.contains(mm_from_m(value)))?.unwrap_or(0.0);
-        let scale = self.number(source, element, "scale", |value| Of::Scale.contains(value))?.unwrap_or(1.0);
+        let offset = self.value(source, element, "offset", kind)?.unwrap_or(0.0);
+        let scale = self.number(source, element, "scale", |value| Of::Scale.contains(value), Of::Scale.words())?.unwrap_or(1.0);
         Ok(Some(EncoderModel { offset, scale }))
     }
 
@@ -146,12 +142,8 @@ impl UrdfJoint<'_> {
         let Some(element) = self.child_element("limit") else {
             return Err(refuse(source, self.node, &self.what("<limit>"), "missing".into(), "one: this joint is not continuous"));
         };
-        let is_plausible = |value: f64| match kind {
-            JointKind::Revolute => Of::Plausible.contains(value.to_degrees()),
-            JointKind::Prismatic => Of::Plausible.contains(mm_from_m(value)),
-        };
-        let lower = self.number(source, element, "lower", is_plausible)?.unwrap_or(0.0);
-        let upper = self.number(source, element, "upper", is_plausible)?.unwrap_or(0.0);
+        let lower = self.value(source, element, "lower", kind)?.unwrap_or(0.0);
+        let upper = self.value(source, element, "upper", kind)?.unwrap_or(0.0);
         if lower < upper {
             return Ok(Limits::Between(lower, upper));
         }
@@ -167,17 +159,27 @@ impl UrdfJoint<'_> {
         format!("{part} of joint `{}`", short(self.name))
     }
 
+    /// A value of a joint, radians or metres, as plausible as it would be in a file of ours.
+    fn value(&self, source: &Source, node: Node<'_, '_>, name: &str, kind: JointKind) -> Result<Option<f64>, InputError> {
+        let expected = match kind {
+            JointKind::Revolute => "a number from -17453 to 17453, radians; a joint without limits is `continuous`",
+            JointKind::Prismatic => "a number from -1000 to 1000, metres",
+        };
+        self.number(source, node, name, |value| Of::Plausible.contains(ScreenUnit::from(kind).from_si(value)), expected)
+    }
+
     fn number(
         &self,
         source: &Source,
         node: Node<'_, '_>,
         name: &str,
         is_in_range: impl Fn(f64) -> bool,
+        expected: &'static str,
     ) -> Result<Option<f64>, InputError> {
         let Some(text) = node.attribute(name) else { return Ok(None) };
         match text.trim().parse() {
             Ok(value) if is_in_range(value) => Ok(Some(value)),
-            _ => Err(refuse(source, node, &self.what(name), format!("`{}`", short(text)), "a number of plausible size")),
+            _ => Err(refuse(source, node, &self.what(name), format!("`{}`", short(text)), expected)),
         }
     }
 

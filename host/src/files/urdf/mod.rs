@@ -77,18 +77,49 @@ pub fn parse_urdf(source: &Source, ends: UrdfEnds<'_>) -> Result<Imported, Input
     chain::imported(source, &robot, &path)
 }
 
-/// Refuses what would take the parser more than a moment. No attribute holds a `<` and each has two quotes, so that the quotes up to the
-/// next `<` bound an element's attributes.
+/// Refuses what would take the parser more than a moment.
 fn check_is_bounded(source: &Source) -> Result<(), InputError> {
-    let refuse = |what: String| Err(InputError::of_file(source.name(), Problem::Xml(what)));
-    let quotes = |part: &str| part.bytes().filter(|byte| matches!(byte, b'"' | b'\'')).count();
-    if source.text().split('<').any(|part| quotes(part) > 2 * MOST_ATTRIBUTES) {
-        return refuse(format!("an element with more than {MOST_ATTRIBUTES} attributes"));
-    }
-    if source.text().matches("xmlns").count() > MOST_NAMESPACES {
-        return refuse(format!("more than {MOST_NAMESPACES} namespaces"));
+    let refuse = |at: usize, what: String| Err(InputError::at(source, at..at + 1, Problem::Xml(what)));
+    let (text, mut at, mut namespaces) = (source.text(), 0, 0);
+    while let Some(open) = text[at..].find('<').map(|further| at + further) {
+        let rest = &text[open..];
+        let behind = |end: &str| rest.find(end).map_or(rest.len(), |found| found + end.len());
+        let length = match rest {
+            _ if rest.starts_with("<!--") => behind("-->"),
+            _ if rest.starts_with("<![CDATA[") => behind("]]>"),
+            _ if rest.starts_with("<?") => behind("?>"),
+            _ => {
+                let (length, attributes) = tag(rest);
+                if attributes > MOST_ATTRIBUTES {
+                    return refuse(open, format!("an element with more than {MOST_ATTRIBUTES} attributes"));
+                }
+                namespaces += rest[..length].matches("xmlns").count();
+                if namespaces > MOST_NAMESPACES {
+                    return refuse(open, format!("more than {MOST_NAMESPACES} namespaces"));
+                }
+                length
+            }
+        };
+        at = open + length;
     }
     Ok(())
+}
+
+/// Length of the tag that a text begins with, and how many quoted values it has.
+fn tag(text: &str) -> (usize, usize) {
+    let (mut quote, mut values) = (None, 0);
+    for (i, byte) in text.bytes().enumerate() {
+        match (quote, byte) {
+            (None, b'>') => return (i + 1, values),
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), _) if open == byte => {
+                quote = None;
+                values += 1;
+            }
+            _ => {}
+        }
+    }
+    (text.len(), values)
 }
 
 /// The character at a row and column, both from 1.
