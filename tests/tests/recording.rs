@@ -143,6 +143,7 @@ fn an_unplugged_board_is_waited_for_and_marked_as_a_gap() {
     assert_eq!(check.json()["samples"], run.json()["samples"]);
     let files = ["--csv", "s.csv", "--parquet", "s.parquet", "--mcap", "s.mcap"];
     let exported = host_cal_in(folder, &[&["log", "export", "s", "--json"][..], &files].concat());
+    assert_eq!((exported.code, exported.json()["gaps"].as_u64()), (1, Some(1)), "{}", exported.stderr);
     assert_eq!(exported.json()["samples"], run.json()["samples"]);
     assert_eq!(exported.json()["settled"], run.json()["settled"]);
     let table = std::fs::read_to_string(folder.join("s.csv")).unwrap();

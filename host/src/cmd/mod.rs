@@ -46,6 +46,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 pub use outcome::{CommandError, Outcome};
 pub use report::show_error;
+#[cfg(not(unix))]
+use unix_only::{demo, virtual_board};
 
 /// Calibrate a robot's kinematics with a ball-bar: from one length at a time to every parameter that lengths can tell.
 #[derive(Parser)]
@@ -82,14 +84,8 @@ enum Command {
     Lvdt(lvdt::LvdtArgs),
     Apply(apply::ApplyArgs),
     Pose(pose::PoseArgs),
-    #[cfg(unix)]
     VirtualBoard(virtual_board::VirtualBoardArgs),
-    #[cfg(unix)]
     Demo(demo::DemoArgs),
-    #[cfg(not(unix))]
-    VirtualBoard(unix_only::UnixOnlyArgs),
-    #[cfg(not(unix))]
-    Demo(unix_only::UnixOnlyArgs),
     Completions(completions::CompletionsArgs),
     Manual(manual::ManualArgs),
 }
@@ -121,14 +117,8 @@ impl Cli {
             Command::Lvdt(args) => args.run(),
             Command::Apply(args) => args.run(),
             Command::Pose(args) => args.run(),
-            #[cfg(unix)]
             Command::VirtualBoard(args) => args.run(),
-            #[cfg(unix)]
             Command::Demo(args) => args.run(),
-            #[cfg(not(unix))]
-            Command::VirtualBoard(args) => args.run("virtual-board"),
-            #[cfg(not(unix))]
-            Command::Demo(args) => args.run("demo"),
             Command::Completions(args) => args.run(Self::command()),
             Command::Manual(args) => args.run(Self::command()),
         }

@@ -1,8 +1,6 @@
 //! What a person sees of a run that goes on: a steady screen on a terminal, lines elsewhere.
 
 mod gauge;
-mod keyboard;
-mod keys;
 mod layout;
 mod picture;
 mod terminal;
@@ -12,12 +10,12 @@ mod tests;
 use std::io::{IsTerminal, Write, stderr, stdin};
 use std::time::{Duration, Instant};
 
-pub(super) use keys::Key;
 pub(super) use picture::{Bar, Joint, Picture, Poses};
 use terminal::Terminal;
 pub(super) use terminal::give_back;
 
 use super::port::EndRequest;
+pub(super) use crate::platform::Key;
 
 /// The steady screen, or lines on stderr.
 pub(super) struct Screen {

@@ -13,11 +13,10 @@ use ratatui::crossterm::cursor::Show;
 use ratatui::crossterm::execute;
 use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
 
-use super::keyboard::Keyboard;
-use super::keys::Key;
 use super::layout;
 use super::picture::Picture;
 use crate::cmd::port::EndRequest;
+use crate::platform::{Key, Keyboard};
 
 /// Whether a screen has the terminal. Held while a frame is written, so that nothing is written into the middle of one, and nothing after
 /// the terminal was given back.

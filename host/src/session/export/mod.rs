@@ -81,8 +81,8 @@ pub fn export_log(
 ) -> Result<LogSummary, LogExportError> {
     let mut reader = LogReader::open(log)?;
     check_names(reader.path(), outputs)?;
-    let shape = Shape::read(&mut LogReader::open(log)?, is_ended)?;
     let mut files: Vec<PendingFile> = outputs.iter().map(|(_, path)| PendingFile::begin(path)).collect::<Result<_, _>>()?;
+    let shape = Shape::read(&mut LogReader::open(log)?, is_ended)?;
     let exported = write_all(&mut reader, &shape, outputs, &mut files, is_ended)?;
     commit_all(files)?;
     Ok(exported)

@@ -1,15 +1,8 @@
-//! What is pressed while a steady screen has the terminal.
+//! Keys in the bytes of a terminal.
 
 use std::collections::VecDeque;
 
-/// A key that means something.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::cmd) enum Key {
-    Enter,
-    Letter(char),
-    /// Ctrl-C, Ctrl-\ and the end of input.
-    End,
-}
+use crate::platform::Key;
 
 /// Keys in the bytes that a terminal in raw mode sends. Sequences of other keys are passed over, whole or broken off.
 #[derive(Debug, Default)]
