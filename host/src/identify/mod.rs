@@ -16,9 +16,11 @@ mod identifiability;
 mod lm;
 mod normality;
 mod observation;
+mod offsets;
 mod pivoting;
 mod residuals;
 mod spectrum;
+mod trend;
 mod uncertainty;
 
 pub use advice::{bound_by_ends, bound_by_pairings, remarks};
@@ -28,8 +30,10 @@ pub use identifiability::{Finding, Identifiability, plausible_error};
 pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
 pub use normality::{AndersonDarling, anderson_darling};
 pub use observation::Observation;
+pub use offsets::{Offset, farthest_offset};
 pub use residuals::{
     Outlier, OutlierTest, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
 };
 pub use spectrum::{RANK_THRESHOLD, Spectrum};
+pub use trend::Trend;
 pub use uncertainty::Uncertainty;
