@@ -261,6 +261,21 @@ fn a_steady_drift_is_told_with_its_error() {
 }
 
 #[test]
+fn a_single_length_not_seen_is_seen_in_its_figure() {
+    let (mut facts, _, _) = facts_of(&Puma::default(), 84e-6);
+    let circles = |facts: &Facts| {
+        let figures = figures(facts).expect("drawn");
+        let proof = figures.iter().find(|figure| figure.name == "held-out").and_then(|figure| figure.drawing.as_ref());
+        proof.expect("a drawing").svg.matches("<circle").count()
+    };
+    assert_eq!(circles(&facts), 0, "curves");
+    for residuals in facts.proofs.iter_mut().flat_map(|proof| [&mut proof.before, &mut proof.after]) {
+        residuals.truncate(1);
+    }
+    assert_eq!(circles(&facts), 2, "before and after");
+}
+
+#[test]
 fn correlations_are_one_on_the_diagonal_and_symmetric() {
     let (facts, _, _) = facts_of(&Puma::default(), 84e-6);
     let values = &facts.correlation.values;

@@ -77,7 +77,7 @@ mod tests {
             let sigmas: f64 = StandardNormal.sample(&mut rng);
             Residual { value_m: 1e-4 * sigmas / weight.sqrt(), weight }
         };
-        let weight = |group: usize| if group % 2 == 0 { 0.5 } else { 2.0 };
+        let weight = |group: usize| if group.is_multiple_of(2) { 0.5 } else { 2.0 };
         let groups: Vec<Vec<Residual>> =
             (0..groups).map(|group| (0..per_group).map(|_| residual(weight(group))).collect()).collect();
         let squares: f64 = groups.iter().flatten().map(|f| f.whitened_m().powi(2)).sum();

@@ -4,7 +4,7 @@ use super::canvas::{AFTER, Axis, CURVE, HEIGHT, Labels, WIDTH, about_zero, chart
 use super::table::{Table, number};
 use super::thin::{drawn, drawn_words};
 use super::{Figure, FigureError, Frame};
-use crate::identify::{Offset, Residual, ResidualSummary, farthest_offset};
+use crate::identify::{Offset, ResidualSummary};
 use crate::report::facts::Facts;
 use crate::units::{fixed, mm_from_m};
 
@@ -15,9 +15,7 @@ const HALF_WIDTH: f64 = 0.36;
 pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let names: Vec<String> = facts.pairings.iter().map(|(name, _)| name.clone()).collect();
     let rows_of = |pairing: usize| (0..facts.rows.len()).filter(move |&row| facts.rows[row].pairing == pairing);
-    let residuals: Vec<Vec<Residual>> =
-        (0..names.len()).map(|pairing| rows_of(pairing).map(|row| facts.rows[row].residual()).collect()).collect();
-    let summaries: Vec<ResidualSummary> = residuals.iter().map(|residuals| ResidualSummary::new(residuals)).collect();
+    let summaries: Vec<ResidualSummary> = facts.residuals_by_pairing().iter().map(|of| ResidualSummary::new(of)).collect();
     let drawn = drawn(facts);
     let svg = draw(FRAME.name, (WIDTH, HEIGHT), |area| {
         let x = Axis { title: "pairing, chuck:sphere", range: -0.5..names.len() as f64 - 0.5, labels: Labels::Names(&names) };
@@ -37,10 +35,9 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
         let [mean, rms] = [summary.mean_m, summary.rms_m].map(|m| number(mm_from_m(m)));
         data.row([name.clone(), summary.count.to_string(), mean, rms]);
     }
-    let farthest =
-        facts.sigma_m.and_then(|sigma_m| farthest_offset(&residuals, sigma_m, facts.rows.len().saturating_sub(facts.told)));
-    let judged =
-        farthest.map_or_else(|| "there are too few lengths to judge the means".to_owned(), |offset| judgement(&names, offset));
+    let judged = facts
+        .farthest_offset()
+        .map_or_else(|| "there are too few lengths to judge the means".to_owned(), |offset| judgement(&names, offset));
     let sentence = format!("Each pairing in the order of measurement, its mean as a line: {judged}.{}", drawn_words(facts));
     Ok(FRAME.drawn(svg, data, sentence))
 }
