@@ -4,12 +4,12 @@ mod shells;
 
 use std::fs;
 
-use ballbar::Kinematics;
+use ballbar::{FreeParameters, Kinematics};
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::experiment::Puma;
 use host_cal::files::{Dataset, RIGS, ROBOTS};
-use host_cal::identify::{Fit, FitOptions, fit};
-use host_cal::report::{Answer, Facts, Inputs, figures};
+use host_cal::identify::{Fit, FitOptions, LmOptions, fit, solve};
+use host_cal::report::{Answer, Facts, Inputs, figures, html};
 use host_cal::simulate::tool_error;
 use serde_json::Value;
 use shells::{DESIGN, puma, runs};
@@ -171,13 +171,108 @@ fn longitude_latitude_and_length_lead_from_the_chuck_to_the_sphere() {
 }
 
 #[test]
-fn left_out_residuals_are_those_of_the_cross_validation() {
+fn left_out_residuals_are_those_of_a_fit_without_them() {
     let puma = Puma::default();
-    let (facts, _, fit) = facts_of(&puma, 84e-6);
+    let (facts, dataset, fit) = facts_of(&puma, 84e-6);
     let proof = facts.proofs.last().expect("enough poses");
-    let by_fit = fit.cross_validation.expect("enough poses");
-    assert!((proof.after_summary().rms_m - by_fit.rms_m).abs() < 1e-12);
-    assert!((proof.before_summary().rms_m - fit.initial.rms_m).abs() < 1e-12);
+    let folds = fit.cross_validation.expect("enough poses").folds;
+    // Every pose is a posture of its own here, so that rows take turns.
+    let (left_out, kept): (Vec<usize>, Vec<usize>) = (0..dataset.rows.len()).partition(|row| row % folds == 0);
+    let kept: Vec<_> = kept.into_iter().map(|row| dataset.rows[row].measurement).collect();
+    let free = FreeParameters::filtered(fit.parameters.len(), |index| fit.parameters[index].held.is_none());
+    let without = solve(&puma.design.chain, &kept, &free, &LmOptions::default());
+    let (design, refitted) = (Kinematics::new(&puma.design.chain), Kinematics::new(&without.chain));
+    for row in left_out {
+        let measurement = &dataset.rows[row].measurement;
+        assert!((proof.before[row].value_m - design.residual(measurement)).abs() < 1e-12, "row {row}");
+        assert!((proof.after[row].value_m - refitted.residual(measurement)).abs() < 1e-9, "row {row}");
+        assert!((proof.after[row].value_m - fit.residuals[row].value_m).abs() > 1e-9, "row {row}: the fit has seen it");
+    }
+}
+
+/// The same poses, of which the pairings take turns.
+fn in_turn<T: Clone>(rows: &[T], pairings: usize, count: usize) -> Vec<T> {
+    let per_pairing = rows.len() / pairings;
+    (0..count).map(|i| rows[i % pairings * per_pairing + i / pairings % per_pairing].clone()).collect()
+}
+
+#[test]
+fn a_page_of_very_many_poses_is_no_larger_than_one_of_many() {
+    let puma = Puma::default();
+    let (facts, _, _) = facts_of(&puma, 84e-6);
+    let of_many = |count: usize| {
+        let mut facts = facts.clone();
+        facts.rows = in_turn(&facts.rows, 9, count);
+        for proof in &mut facts.proofs {
+            proof.before = in_turn(&proof.before, 9, count);
+            proof.after = in_turn(&proof.after, 9, count);
+        }
+        let figures = figures(&facts).expect("drawn");
+        (html(&facts, &figures, "now"), figures)
+    };
+    let (many, (page, figures)) = (of_many(5_000).0, of_many(20_000));
+    assert!(page.len() < 4_500_000, "{} bytes", page.len());
+    assert!(page.len() < many.len() * 11 / 10, "{} of {} bytes", page.len(), many.len());
+    for name in ["shell", "pairings", "time", "joints", "scene"] {
+        let figure = figures.iter().find(|figure| figure.name == name).expect(name);
+        assert!(figure.sentence.contains("of the 20000 lengths are drawn"), "{}", figure.sentence);
+        let rows = figure.drawing.as_ref().expect(name).data.rows.len();
+        assert!(rows == 20_000 || name == "pairings", "{name}: {rows} rows of data");
+    }
+
+    // What is drawn is a fair choice: each chuck keeps its third.
+    let (_, data) = page.split_once("<script type=\"application/json\">").expect("data");
+    let data: Value = serde_json::from_str(data.split_once("</script>").expect("an end").0).expect("JSON");
+    let points = data["points"].as_array().expect("points");
+    assert!((2_900..3_400).contains(&points.len()), "{}", points.len());
+    for chuck in 0..3 {
+        let share = points.iter().filter(|point| point[1] == chuck).count() as f64 / points.len() as f64;
+        assert!((share - 1.0 / 3.0).abs() < 0.02, "chuck {chuck}: {share}");
+    }
+}
+
+#[test]
+fn a_steady_drift_is_told_with_its_error() {
+    let puma = Puma::default();
+    let mut dataset = puma.shells(0.46, 30, 84e-6, 3);
+    dataset.rows = in_turn(&dataset.rows, 9, dataset.rows.len());
+    let told = |dataset: &Dataset| {
+        let fit = fit(&puma.design, dataset, &FitOptions::default()).expect("enough poses");
+        let facts = facts(&puma, dataset, &fit);
+        let sentence = |name: &str| {
+            figures(&facts).expect("drawn").into_iter().find(|figure| figure.name == name).expect("a figure").sentence
+        };
+        (facts.trend().expect("enough poses"), sentence("time"), sentence("pairings"))
+    };
+    let (trend, time, pairings) = told(&dataset);
+    assert!(!trend.is_significant() && time.contains(" mm: no more than chance gives."), "{time}");
+    assert!(pairings.contains("none is further off than chance allows"), "{pairings}");
+
+    let drift_m = 2.0 * 84e-6;
+    let last = (dataset.rows.len() - 1) as f64;
+    for (i, row) in dataset.rows.iter_mut().enumerate() {
+        row.measurement.length_m += drift_m * i as f64 / last;
+    }
+    let (trend, time, _) = told(&dataset);
+    // The parameters take a part of it, and never more than there is.
+    assert!((0.5..1.1).contains(&(trend.change_m / drift_m)), "{trend:?}");
+    assert!(trend.is_significant() && time.contains("standard errors, more than chance gives."), "{time}");
+    assert!(!time.contains("follow one another (drift"), "{time}");
+}
+
+#[test]
+fn a_single_length_not_seen_is_seen_in_its_figure() {
+    let (mut facts, _, _) = facts_of(&Puma::default(), 84e-6);
+    let circles = |facts: &Facts| {
+        let figures = figures(facts).expect("drawn");
+        let proof = figures.iter().find(|figure| figure.name == "held-out").and_then(|figure| figure.drawing.as_ref());
+        proof.expect("a drawing").svg.matches("<circle").count()
+    };
+    assert_eq!(circles(&facts), 0, "curves");
+    for residuals in facts.proofs.iter_mut().flat_map(|proof| [&mut proof.before, &mut proof.after]) {
+        residuals.truncate(1);
+    }
+    assert_eq!(circles(&facts), 2, "before and after");
 }
 
 #[test]
@@ -208,9 +303,18 @@ fn an_outlier_drift_and_few_parameters_are_reasons_for_reserve() {
     assert!(reasons(&dataset).contains("1 length stands out"), "{}", reasons(&dataset));
 
     dataset.rows[17].measurement.length_m -= 2e-3;
-    for (i, row) in dataset.rows.iter_mut().enumerate() {
-        row.measurement.length_m += 3e-3 * (i as f64 / 60.0).sin();
-    }
+    let drifting = |mut dataset: Dataset| {
+        for (i, row) in dataset.rows.iter_mut().enumerate() {
+            row.measurement.length_m += 3e-3 * (i as f64 / 60.0).sin();
+        }
+        dataset
+    };
+    // Pairing by pairing, the same drift is as if the pairings were off.
+    let by_pairing = drifting(dataset.clone());
+    let offset = facts(&puma, &by_pairing, &fitted(&by_pairing)).farthest_offset().expect("enough poses");
+    assert!(offset.is_beyond_chance, "{offset:?}");
+    dataset.rows = in_turn(&dataset.rows, 9, dataset.rows.len());
+    let dataset = drifting(dataset);
     assert!(reasons(&dataset).contains("Residuals follow one another"), "{}", reasons(&dataset));
 
     let mut one_pairing = puma.shells(0.46, 200, 84e-6, 3);

@@ -16,10 +16,12 @@ mod identifiability;
 mod lm;
 mod normality;
 mod observation;
+mod offsets;
 mod pivoting;
 mod postures;
 mod residuals;
 mod spectrum;
+mod trend;
 mod uncertainty;
 
 pub use advice::{bound_by_ends, bound_by_pairings, remarks};
@@ -29,9 +31,11 @@ pub use identifiability::{Finding, Identifiability, plausible_error};
 pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
 pub use normality::{AndersonDarling, anderson_darling};
 pub use observation::Observation;
+pub use offsets::{Offset, farthest_offset};
 pub use postures::postures;
 pub use residuals::{
     Outlier, OutlierTest, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
 };
 pub use spectrum::{RANK_THRESHOLD, Spectrum};
+pub use trend::Trend;
 pub use uncertainty::Uncertainty;

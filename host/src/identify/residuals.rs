@@ -2,6 +2,7 @@
 
 use ballbar::{Chain, Kinematics};
 
+use super::trend::correlation_of_neighbours;
 use crate::files::{Dataset, PairingId, PoseRow};
 
 /// A residual `f = d_measured − d_computed` and its weight, 1 on average.
@@ -120,19 +121,12 @@ pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
     outliers
 }
 
-/// Correlation of each residual with the next one of the same pairing, in the order of measurement; `None` for fewer than
-/// twenty such neighbours. Independent noise gives `0 ± 1/√n`.
+/// Correlation of each residual with the next one of the same pairing, both less the pairing's mean, in the order of measurement;
+/// `None` for fewer than twenty such neighbours. Independent noise gives `0 ± 1/√n`.
 pub fn neighbour_correlation(dataset: &Dataset, residuals: &[Residual]) -> Option<f64> {
-    const FEWEST: usize = 20;
-    let residuals_m: Vec<f64> = residuals.iter().map(|f| f.whitened_m()).collect();
-    let (mut products, mut squares, mut count) = (0.0, 0.0, 0);
-    for pairing in dataset.pairings() {
-        let of_pairing: Vec<f64> = dataset.rows_of(pairing).map(|row| residuals_m[row]).collect();
-        products += of_pairing.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
-        squares += of_pairing.iter().map(|f| f * f).sum::<f64>();
-        count += of_pairing.len().saturating_sub(1);
-    }
-    (count >= FEWEST && squares > 0.0).then(|| products / squares)
+    let of_pairing = |pairing| dataset.rows_of(pairing).map(|row| residuals[row]).collect();
+    let groups: Vec<Vec<Residual>> = dataset.pairings().into_iter().map(of_pairing).collect();
+    correlation_of_neighbours(&groups)
 }
 
 /// Each residual less the median of those around it, pairing by pairing, in the order of measurement; `None` for a row with

@@ -63,6 +63,8 @@ pub struct RowFact {
     pub after_m: f64,
     /// The same times the root of the row's weight, which is 1 on average: what scatters alike in all rows, metres.
     pub whitened_m: f64,
+    /// That weight.
+    pub weight: f64,
 }
 
 /// A half sphere about a chuck on which poses were measured.
@@ -242,6 +244,7 @@ fn rows(inputs: &Inputs<'_>, pairings: &[PairingId], before: &[Residual]) -> Vec
             before_m: before[i].value_m,
             after_m: fit.residuals[i].value_m,
             whitened_m: fit.residuals[i].whitened_m(),
+            weight: fit.residuals[i].weight,
         }
     };
     dataset.rows.iter().enumerate().map(fact).collect()

@@ -9,6 +9,7 @@
 
 mod facts;
 mod figures;
+mod order;
 mod page;
 mod proof;
 mod tables;

@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::json;
 
 use super::facts::{Facts, RowFact};
-use super::figures::{CHUCKS, Figure, dark_rules, hex, wires_m};
+use super::figures::{CHUCKS, Figure, dark_rules, drawn, hex, wires_m};
 use super::proof::Proof;
 use super::tables::{largest, parameters};
 use super::verdict::{Answer, Verdict};
@@ -177,7 +177,7 @@ fn scene_data(facts: &Facts) -> String {
     });
     let colours = CHUCKS.map(|(light, dark)| [hex(light), hex(dark)]);
     let data = json!({
-        "points": facts.rows.iter().map(point).collect::<Vec<_>>(),
+        "points": drawn(facts).into_iter().map(|row| point(&facts.rows[row])).collect::<Vec<_>>(),
         "chucks": facts.chucks.iter().map(|(name, at)| json!({ "name": name, "at": place(at) })).collect::<Vec<_>>(),
         "wires": wires.collect::<Vec<_>>(),
         "colours": colours,

@@ -43,7 +43,18 @@
     context.fillText(text, x + 8, y - 8);
   };
 
+  // Setting a size clears the canvas: it is done just before drawing.
+  const fit = () => {
+    const sharpness = window.devicePixelRatio || 1;
+    width = canvas.clientWidth || 1;
+    height = canvas.clientHeight || 1;
+    const pixels = [width, height].map((side) => Math.floor(side * sharpness));
+    if (canvas.width !== pixels[0] || canvas.height !== pixels[1]) [canvas.width, canvas.height] = pixels;
+    context.setTransform(sharpness, 0, 0, sharpness, 0, 0);
+  };
+
   const draw = () => {
+    fit();
     context.clearRect(0, 0, width, height);
     context.font = "14px system-ui, sans-serif";
     context.lineWidth = 1;
@@ -76,20 +87,21 @@
     });
   };
 
+  // However many events there are between two frames, each frame is drawn once.
+  let isAsked = false;
+  const redraw = () => {
+    if (isAsked) return;
+    isAsked = true;
+    requestAnimationFrame(() => {
+      isAsked = false;
+      draw();
+    });
+  };
+
   const turnBy = (right, down) => {
     turn += right;
     tilt = Math.max(-1.5, Math.min(1.5, tilt + down));
-    draw();
-  };
-
-  const fit = () => {
-    width = canvas.clientWidth || 1;
-    height = canvas.clientHeight || 1;
-    const sharpness = window.devicePixelRatio || 1;
-    canvas.width = width * sharpness;
-    canvas.height = height * sharpness;
-    context.setTransform(sharpness, 0, 0, sharpness, 0, 0);
-    draw();
+    redraw();
   };
 
   const RADIANS_A_PIXEL = 0.008, RADIANS_A_KEY = 0.1;
@@ -111,7 +123,7 @@
     turnBy(...keys[event.key].map((way) => way * RADIANS_A_KEY));
   });
   figure.classList.add("turns");
-  new ResizeObserver(fit).observe(canvas);
-  dark.addEventListener("change", draw);
-  fit();
+  new ResizeObserver(redraw).observe(canvas);
+  dark.addEventListener("change", redraw);
+  redraw();
 })();

@@ -2,6 +2,7 @@
 
 use super::facts::Facts;
 use super::proof::ProofKind;
+use crate::units::{fixed, mm_from_m};
 
 /// What the result is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,8 +113,23 @@ fn reserves(facts: &Facts) -> Vec<String> {
     }
     if let Some(correlation) = facts.neighbour_correlation.filter(|&correlation| correlation > ALIKE) {
         reserves.push(format!(
-            "Residuals follow one another in the order of measurement (correlation {correlation:.2}): something drifts or jumps, such \
-             as the zero of the bar, and all deviations on this page are too small."
+            "Residuals follow one another in the order of measurement (correlation {correlation:.2}): something drifts, such as the zero \
+             of the bar, or the robot does what the model does not hold; all deviations on this page are too small."
+        ));
+    }
+    if let Some(trend) = facts.trend().filter(|trend| trend.is_significant()) {
+        reserves.push(format!(
+            "From the first length to the last the residuals change by {} mm, {:.1} standard errors: something drifts.",
+            fixed(mm_from_m(trend.change_m), 3),
+            trend.errors()
+        ));
+    }
+    if let Some(offset) = facts.farthest_offset().filter(|offset| offset.is_beyond_chance) {
+        reserves.push(format!(
+            "The lengths of {} are off by {} mm on average, more than chance gives: its chuck or sphere is not where the rig's file says, \
+             or something drifted meanwhile.",
+            facts.pairings[offset.group].0,
+            fixed(mm_from_m(offset.mean_m), 3)
         ));
     }
     if let Some(normality) = facts.normality.filter(|normality| normality.p_value < SURELY_NOT) {

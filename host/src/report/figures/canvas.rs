@@ -58,6 +58,8 @@ const LONGEST_NAME: usize = 14;
 const LINE: u32 = 4;
 const DOT: u32 = 4;
 const FEW: usize = 100;
+/// Of a line; a figure is not many more units wide.
+const MOST_CORNERS: usize = 1500;
 /// Labels of powers of ten that an axis has room for.
 const MOST_POWERS: f64 = 8.0;
 
@@ -235,9 +237,15 @@ pub(super) fn dots(chart: &mut Chart<'_>, colour: RGBColor, points: impl IntoIte
     Ok(())
 }
 
-/// A line through points.
+/// A line through points, or through some of very many; where there is only one, a dot.
 pub(super) fn line(chart: &mut Chart<'_>, colour: RGBColor, points: impl IntoIterator<Item = (f64, f64)>) -> Result<(), Failure> {
-    chart.draw_series(LineSeries::new(points, colour.stroke_width(LINE)))?;
+    let points: Vec<(f64, f64)> = points.into_iter().collect();
+    if points.len() == 1 {
+        return dots(chart, colour, points);
+    }
+    let (every, last) = (points.len().div_ceil(MOST_CORNERS).max(1), points.len().saturating_sub(1));
+    let corners = points.into_iter().enumerate().filter(|(i, _)| i % every == 0 || *i == last).map(|(_, point)| point);
+    chart.draw_series(LineSeries::new(corners, colour.stroke_width(LINE)))?;
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 
 use super::canvas::{AFTER, Axis, Labels, WIDTH, about_zero, chart, dots, draw};
 use super::table::{Table, number};
+use super::thin::{drawn, drawn_words};
 use super::{Figure, FigureError, Frame};
 use crate::report::facts::Facts;
 use crate::units::{ScreenUnit, mm_from_m};
@@ -17,14 +18,15 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let q = |joint: usize, row: usize| unit(joint).from_si(facts.rows[row].q[joint]);
     let residuals_mm: Vec<f64> = facts.rows.iter().map(|row| mm_from_m(row.after_m)).collect();
     let y = Axis { title: "residual, mm", range: about_zero(residuals_mm.iter().copied()), labels: Labels::Numbers };
+    let drawn = drawn(facts);
     let svg = draw(FRAME.name, (2 * WIDTH, lines as u32 * PANEL_HEIGHT), |area| {
         for (joint, panel) in area.split_evenly((lines, COLUMNS)).iter().enumerate().take(joints) {
             let values = (0..residuals_mm.len()).map(|row| q(joint, row));
-            let (low, high) = values.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
             let room = (0.03 * (high - low)).max(1e-3);
             let title = format!("q{}, {}", joint + 1, if unit(joint) == ScreenUnit::Degree { "°" } else { "mm" });
             let x = Axis { title: &title, range: low - room..high + room, labels: Labels::Numbers };
-            dots(&mut chart(panel, "", &x, &y)?, AFTER, values.zip(residuals_mm.iter().copied()))?;
+            dots(&mut chart(panel, "", &x, &y)?, AFTER, drawn.iter().map(|&row| (q(joint, row), residuals_mm[row])))?;
         }
         Ok(())
     })?;
@@ -35,9 +37,10 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
         let values = (0..joints).map(|joint| number(q(joint, i)));
         data.rows.push(std::iter::once(row.number.to_string()).chain(values).chain([number(residuals_mm[i])]).collect());
     }
-    let sentence =
-        "Even bands say that no joint's angle matters; a wave would be an eccentric encoder or gear, which the model does not \
-                    hold, and a step backlash."
-            .to_owned();
+    let sentence = format!(
+        "Even bands say that no joint's angle matters; a wave would be an eccentric encoder or gear, which the model does not hold, \
+         and a step backlash.{}",
+        drawn_words(facts)
+    );
     Ok(FRAME.drawn(svg, data, sentence))
 }

@@ -11,6 +11,7 @@ mod scene;
 mod shell;
 mod singular;
 mod table;
+mod thin;
 mod time;
 mod workspace;
 
@@ -21,6 +22,7 @@ use super::facts::Facts;
 pub(super) use canvas::{CHUCKS, dark_rules, hex};
 pub(super) use scene::wires_m;
 pub use table::Table;
+pub(super) use thin::drawn;
 
 /// One figure of the page.
 #[derive(Clone, Debug)]

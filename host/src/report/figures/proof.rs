@@ -32,13 +32,16 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     for (i, (before, after)) in before_mm.iter().zip(&after_mm).enumerate() {
         data.row([number(*before), number(*after), number(percent(i, before_mm.len()))]);
     }
-    let sentence = format!(
-        "On {}: half of the lengths are off by less than {:.3} mm after the fit, by {:.3} mm before; the further left the blue curve, \
-         the better.",
-        proof.name,
-        median(&after_mm),
-        median(&before_mm)
-    );
+    let (before, after) = (median(&before_mm), median(&after_mm));
+    let sentence = if after_mm.len() == 1 {
+        format!("On {}: the one length is off by {after:.3} mm after the fit, by {before:.3} mm before.", proof.name)
+    } else {
+        format!(
+            "On {}: half of the lengths are off by less than {after:.3} mm after the fit, by {before:.3} mm before; the further left the \
+             blue curve, the better.",
+            proof.name
+        )
+    };
     Ok(FRAME.drawn(svg, data, sentence))
 }
 

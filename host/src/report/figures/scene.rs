@@ -5,6 +5,7 @@ use plotters::prelude::{Circle, Color, IntoFont, PathElement, Rectangle, Text};
 
 use super::canvas::{CHUCKS, HEIGHT, INK, WIDTH, draw, shortened};
 use super::table::{Table, number};
+use super::thin::{drawn, drawn_words};
 use super::{Figure, FigureError, Frame};
 use crate::report::facts::{Facts, Shell};
 use crate::units::mm_from_m;
@@ -21,7 +22,7 @@ const TEXT: u32 = 34;
 pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let view = View::of(facts);
     let largest_m = facts.rows.iter().fold(1e-12, |largest: f64, row| largest.max(row.after_m.abs()));
-    let mut dots: Vec<usize> = (0..facts.rows.len()).collect();
+    let mut dots = drawn(facts);
     dots.sort_by(|&a, &b| view.depth(&facts.rows[b].sphere_m).total_cmp(&view.depth(&facts.rows[a].sphere_m)));
     let chuck_of = |row: usize| facts.pairings[facts.rows[row].pairing].1;
     let svg = draw(FRAME.name, SIZE, |area| {
@@ -58,8 +59,9 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     };
     let sentence = format!(
         "Each dot is the tool's sphere in one pose, by the fit, in the colour of its chuck and larger for a larger residual (up to \
-         {:.3} mm): gaps are places that nothing was measured at.{shells}",
-        mm_from_m(largest_m)
+         {:.3} mm): gaps are places that nothing was measured at.{shells}{}",
+        mm_from_m(largest_m),
+        drawn_words(facts)
     );
     Ok(FRAME.drawn(svg, data, sentence))
 }
