@@ -21,10 +21,12 @@ fn board(folder: &Path) -> VirtualBoard {
     VirtualBoard::start(options).expect("the board starts")
 }
 
-/// `host-cal collect` in a cell, with a plan of 24 poses.
+/// `host-cal collect` in a cell, with a plan of 24 poses and a robot slow enough to be interfered with.
 fn collect(cell: &SimulatedCell, link: &str) -> AtTerminal {
     let args = cell.collect_args("session");
     let args: Vec<&str> = args.iter().map(|arg| if arg == "sim" { link } else { arg.as_str() }).collect();
+    let quick = args.iter().position(|arg| *arg == "--speed-deg-s").expect("a speed");
+    let args = [&args[..quick], &["--speed-deg-s", "20"], &args[quick + 2..]].concat();
     AtTerminal::start(cell.folder.path(), &args, WIDE)
 }
 
@@ -118,7 +120,7 @@ fn a_lost_port_is_shown_and_can_be_left() {
 fn a_port_lost_while_collecting_leaves_the_reason_on_a_sane_terminal() {
     let mut cell = SimulatedCell::start(plant(1), 0.0, &SHORT_PLAN);
     let mut run = collect(&cell, "sim");
-    run.wait_for("2 of 24 poses");
+    run.wait_for("2/24 line");
     let other = board(&cell.path(""));
     drop(std::mem::replace(&mut cell.board, other));
     let (code, text) = run.finish();
@@ -152,7 +154,7 @@ fn a_terminal_that_can_draw_nothing_gets_lines() {
 fn collect_hears_keys_and_says_what_happens() {
     let cell = SimulatedCell::start(plant(1), 0.0, &SHORT_PLAN);
     let mut run = collect(&cell, "sim");
-    run.wait_for("2 of 24 poses");
+    run.wait_for("2/24 line");
     run.press("p");
     run.wait_for("> paused: r to go on");
     run.press("e");
@@ -160,7 +162,7 @@ fn collect_hears_keys_and_says_what_happens() {
     run.press("x");
     run.press("r");
     run.wait_for("going on");
-    run.wait_for("4 of 24 poses");
+    run.wait_for("4/24 line");
     run.press("q");
     let (code, text) = run.finish();
     assert_eq!(code, 1, "{text}");
