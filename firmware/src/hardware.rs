@@ -17,7 +17,7 @@ pub const ENCODERS: usize = 6;
 pub struct EncoderLatch {
     /// The hardware counters as they stand; a 16-bit one fills the lower half.
     pub counters: [u32; ENCODERS],
-    /// Each counter as it stood at the encoder's index pulse, where one came since the last latch. When several came, the last.
+    /// Each counter as it stood at the encoder's index pulse, where one came since the last latch. When several came, one of them.
     pub at_index: [Option<u32>; ENCODERS],
 }
 

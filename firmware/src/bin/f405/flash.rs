@@ -61,22 +61,67 @@ impl SlotFlash {
     /// Runs one operation between unlocking and locking the controller, and says how it went.
     fn unlocked(&mut self, operation: impl FnOnce(&FLASH) -> Result<(), FlashError>) -> Result<(), FlashError> {
         const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-        for key in KEYS {
-            self.registers.keyr().write(|w| w.key().set(key));
+        // Keys to a controller that is open would lock it until the next reset.
+        if self.registers.cr().read().lock().is_locked() {
+            for key in KEYS {
+                self.registers.keyr().write(|w| w.key().set(key));
+            }
         }
         if self.registers.cr().read().lock().is_locked() {
             return Err(FlashError::Locked);
         }
+        wait(&self.registers);
         clear_errors(&self.registers);
         let outcome = operation(&self.registers);
-        self.registers.cr().write(|w| w.lock().locked());
+        lock(&self.registers);
         outcome
     }
 }
 
+// The control register is only ever modified: its reset value, which a plain write starts from, has LOCK set.
+
+/// Says what is to come; nothing begins yet.
+fn set_up(registers: &FLASH, operation: Operation) {
+    registers.cr().modify(|_, w| {
+        w.psize().psize32();
+        w.mer().clear_bit();
+        w.pg().bit(operation == Operation::Program);
+        match operation {
+            Operation::Program => w.ser().clear_bit(),
+            // SAFETY: the number of a sector, and none that holds any of the program (`erase`).
+            Operation::Erase(sector) => unsafe { w.ser().set_bit().snb().bits(sector) },
+        }
+    });
+}
+
+/// What the controller can be set up for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Operation {
+    /// Words that are written to memory.
+    Program,
+    /// A sector, once it is started.
+    Erase(u8),
+}
+
+/// Leaves the controller as a reset does. In two steps, so that it never has to take LOCK together with an operation.
+fn lock(registers: &FLASH) {
+    registers.cr().modify(|_, w| {
+        w.psize().psize8();
+        w.pg().clear_bit();
+        w.ser().clear_bit();
+        // SAFETY: any number is one that the register takes.
+        unsafe { w.snb().bits(0) }
+    });
+    registers.cr().modify(|_, w| w.lock().locked());
+}
+
+fn wait(registers: &FLASH) {
+    while registers.sr().read().bsy().is_busy() {}
+}
+
 /// Waits for the controller and reads what it has to complain of.
 fn finish(registers: &FLASH) -> Result<(), FlashError> {
-    while registers.sr().read().bsy().is_busy() {}
+    wait(registers);
     let status = registers.sr().read();
     if status.wrperr().is_active() {
         Err(FlashError::WriteProtected)
@@ -139,13 +184,8 @@ impl NorFlash for SlotFlash {
         check_erase(self, from, to).map_err(FlashError::Range)?;
         self.unlocked(|registers| {
             for sector in from as usize / SECTOR_BYTES..to as usize / SECTOR_BYTES {
-                registers.cr().write(|w| {
-                    w.psize().psize32();
-                    w.ser().sector_erase();
-                    // SAFETY: sector 1 or 2, as was checked: neither holds any of the program.
-                    unsafe { w.snb().bits(FIRST_SECTOR + sector as u8) };
-                    w.strt().start()
-                });
+                set_up(registers, Operation::Erase(FIRST_SECTOR + sector as u8));
+                registers.cr().modify(|_, w| w.strt().start());
                 let outcome = finish(registers);
                 reset_data_cache(registers);
                 outcome?;
@@ -157,15 +197,13 @@ impl NorFlash for SlotFlash {
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         check_write(self, offset, bytes.len()).map_err(FlashError::Range)?;
         self.unlocked(|registers| {
-            registers.cr().write(|w| {
-                w.psize().psize32();
-                w.pg().program()
-            });
+            set_up(registers, Operation::Program);
             let (words, _) = bytes.as_chunks::<WORD_BYTES>();
             for (i, word) in words.iter().enumerate() {
                 let address = SLOTS_ADDRESS + offset as usize + i * WORD_BYTES;
                 // SAFETY: a whole aligned word within the slots, as was checked, and the controller is set to take words.
                 unsafe { ptr::write_volatile(address as *mut u32, u32::from_le_bytes(*word)) };
+                cortex_m::asm::dsb(); // by another bus than the controller's registers: it must have arrived before they are asked
                 finish(registers)?;
             }
             Ok(())

@@ -7,6 +7,7 @@
 #![no_main]
 
 mod board;
+mod boot;
 mod clock;
 #[path = "../common/crash.rs"]
 mod crash;
