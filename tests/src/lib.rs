@@ -11,6 +11,8 @@ pub mod data;
 pub mod emulator;
 pub mod experiment;
 pub mod exports;
+#[cfg(unix)]
+pub mod f405_emulator;
 pub mod fake_board;
 pub mod fake_hardware;
 pub mod naive;

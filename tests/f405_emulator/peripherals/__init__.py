@@ -1,0 +1,1 @@
+"""The chip's peripherals, as far as the image touches them."""
