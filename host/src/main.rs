@@ -3,10 +3,10 @@
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::Parser;
 use host_cal::cmd::{Cli, show_error};
 use miette::{GraphicalTheme, MietteHandlerOpts};
 
+#[expect(clippy::disallowed_methods, reason = "stderr is only asked whether it is a terminal")]
 fn main() -> ExitCode {
     // Colour and the terminal's width where there is one; the same plain text everywhere else.
     let hook = miette::set_hook(Box::new(|_| {
@@ -20,10 +20,10 @@ fn main() -> ExitCode {
     }));
     debug_assert!(hook.is_ok(), "nothing else sets the hook");
 
-    match Cli::parse().run() {
+    match Cli::from_args().run() {
         Ok(outcome) => outcome.into(),
         Err(error) => {
-            show_error(&error.report);
+            show_error(error.report);
             ExitCode::from(error.exit_code)
         }
     }

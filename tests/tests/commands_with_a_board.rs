@@ -286,3 +286,31 @@ impl Drop for Peer {
         }
     }
 }
+
+#[test]
+fn a_hostile_name_on_the_board_is_shown_harmless_by_every_command() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = bare_board(folder);
+    let (name, puma) = ("\u{202e}lmot\u{2028}\u{200b}", host_cal::files::ROBOTS[0].1);
+    std::fs::write(folder.join("robot.toml"), puma.replacen("name = ", &format!("name = \"{name}\" #"), 1)).unwrap();
+    let apply: &[&str] = &["apply", "port", "--robot", "robot.toml", "--uncalibrated", "--vectors", "20"];
+    let home: &[&str] = &["home", "port", "--q", "0,-90,90,0,0,0"];
+    let commands: [&[&str]; 7] = [
+        apply,
+        apply,
+        home,
+        &["status", "port"],
+        &["pose", "port"],
+        &["stream", "port", "--for", "1s"],
+        &["stream", "port", "--for", "1s", "--session", "s"],
+    ];
+    for command in commands.iter().flat_map(|command| [command.to_vec(), [command, &["--json"][..]].concat()]) {
+        let run = good(folder, &command);
+        let hidden = |text: &String| text.chars().find(|&c| c != '\n' && host_cal::text::is_hidden(c));
+        assert_eq!((hidden(&run.stdout), hidden(&run.stderr)), (None, None), "{command:?}: {}", run.transcript());
+    }
+    assert_eq!(good(folder, &["pose", "port", "--json"]).json()["robot"], name);
+    let status = run(folder, &["status", "port"]).stdout;
+    assert!(status.contains("\\u{202e}lmot\\u{2028}\\u{200b}"), "{status}");
+}

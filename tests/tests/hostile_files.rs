@@ -224,8 +224,8 @@ fn a_robots_name_is_a_line_of_a_screen_and_a_file_of_no_end_is_not_read_to_it() 
     let long = "n".repeat(201);
     let text = |name: &str| format!("name = {name}\n{}", ROBOT.split_once('\n').expect("a name").1);
     for (name, says) in [
-        ("\"\\u001b[31mred\"", "robot.toml:1: `name` is ` [31mred`, 8 bytes long"),
-        ("\"one\\ntwo\"", "robot.toml:1: `name` is `one two`, 7 bytes long"),
+        ("\"\\u001b[31mred\"", "robot.toml:1: `name` is `\\u{1b}[31mred`, 8 bytes long"),
+        ("\"one\\ntwo\"", "robot.toml:1: `name` is `one\\ntwo`, 7 bytes long"),
         (&format!("\"{long}\""), "201 bytes long, expected at most 200 bytes"),
         ("\"\u{1b}[31mred\"", "robot.toml:1: "),
         (&format!("\"{}\"", "n".repeat(1 << 20)), "robot.toml: longer than 1048576 bytes"),

@@ -301,10 +301,10 @@ fn an_export_that_is_refused_changes_nothing() {
     for (code, args, message) in [
         (3, ["--csv", "a.csv", "--mcap", "absent/a.mcap"], "absent/a.mcap: cannot be written"),
         (3, ["--parquet", "s", "--csv", "a.csv"], "s: cannot be written: it is there, but is no regular file"),
-        (2, ["--csv", "a", "--parquet", "a"], "a: is named twice, as an output and as another output"),
-        (2, ["--csv", "./new", "--parquet", "s/../new"], "s/../new: is named twice, as an output and as another output"),
-        (2, ["--csv", "s/stream.bbl", "--mcap", "a"], "s/stream.bbl: is named twice, as an output and as the log"),
-        (2, ["--csv", "s/poses.csv", "--mcap", "a"], "s/poses.csv: is named twice, as an output and as a file of the session"),
+        (2, ["--csv", "a", "--parquet", "a"], "a: is named twice, for two outputs"),
+        (2, ["--csv", "./new", "--parquet", "s/../new"], "s/../new: is named twice, for two outputs"),
+        (2, ["--csv", "s/stream.bbl", "--mcap", "a"], "s/stream.bbl: is a file of a session, which no output replaces"),
+        (2, ["--csv", "s/poses.csv", "--mcap", "a"], "s/poses.csv: is a file of a session, which no output replaces"),
         (3, ["--csv", "a.csv", "--mcap", "new/"], "new/: cannot be written: this is a folder's name, not a file's"),
         (3, ["--csv", "a.csv", "--mcap", &"n".repeat(300)], "File name too long"),
     ] {

@@ -14,6 +14,7 @@ use crate::board::{
     BoardError, BoardLink, KinematicsDifference, NOMINAL_TRAVEL_M, RobotOnBoard, nominal_lvdt, parameter_set, verify_kinematics,
 };
 use crate::files::Robot;
+use crate::text::one_line;
 
 /// Upload a calibrated robot to the board, and verify the board's kinematics against this program's
 #[derive(Args)]
@@ -171,12 +172,12 @@ fn bytes_of(set: &ParameterSet) -> Vec<u8> {
 impl Report for ApplyReport {
     fn text(&self) -> String {
         let what = if self.calibrated { "calibrated" } else { "UNCALIBRATED" };
-        let before = self.replaced.as_ref().map_or("nothing".into(), |name| format!("`{name}`"));
+        let before = self.replaced.as_ref().map_or("nothing".into(), |name| format!("`{}`", one_line(name)));
         format!(
             "{}: {what} robot `{}` stored (CRC {}, commit {}) in place of {before}\nread back bit for bit; LVDT curve {}\n\
              {} joint vectors: the board's poses differ from this program's by at most {:.3} µm and {:.3} µrad\n",
-            self.port,
-            self.robot,
+            one_line(&self.port),
+            one_line(&self.robot),
             self.crc,
             self.sequence,
             self.lvdt,

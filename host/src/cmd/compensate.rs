@@ -8,12 +8,13 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::inputs::{ListError, OutputArgs};
+use super::inputs::{ForceArgs, ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use super::table::{Columns, fixed};
-use crate::files::{MOST_TARGET_BYTES, Robot, Source, Target, compensated_csv, read_targets};
+use crate::files::{FileKind, Output, Robot, Source, Target, compensated_csv, read_targets};
 use crate::kinematics::{Compensation, Compensator, link_angles};
+use crate::text::shown_path;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 
 /// Commands that bring a controller with its nominal model to the true targets
@@ -37,6 +38,8 @@ pub(super) struct CompensateArgs {
     /// File of commands to write
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ForceArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -93,12 +96,12 @@ impl CompensateArgs {
         }
         let compensator = Compensator::new(&robot, &nominal)?;
         let start = self.start(&nominal, &compensator)?;
-        let targets = read_targets(&Source::read_at_most(&self.targets, MOST_TARGET_BYTES)?, &nominal)?;
+        let targets = read_targets(&Source::read_rows(&self.targets)?, &nominal)?;
         let (done, not_reached) = compensated(&robot, &compensator, &targets, start);
         let warnings = self.warnings(&robot, &done, &not_reached);
         warnings.iter().for_each(|warning| warn(warning));
         if let Some(path) = &self.out {
-            write_file(path, &compensated_csv(&robot, &done))?;
+            write_file(Output { path, kind: FileKind::Commands, force: self.replace.force }, &compensated_csv(&robot, &done))?;
         }
         let report = self.report(&robot, &done, not_reached, warnings);
         print(&report, self.output.json)?;
@@ -253,7 +256,7 @@ impl Report for CompensateReport {
             text += &format!("largest error by the calibrated robot: {before} mm before, {left} mm left\n");
         }
         if let Some(out) = &self.out {
-            text += &format!("written to {}\n", out.display());
+            text += &format!("written to {}\n", shown_path(out));
         }
         text
     }

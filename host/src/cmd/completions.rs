@@ -64,4 +64,8 @@ impl Report for CompletionsReport {
     fn text(&self) -> String {
         self.script.clone()
     }
+
+    fn is_document(&self) -> bool {
+        true
+    }
 }

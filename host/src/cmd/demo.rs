@@ -12,12 +12,13 @@ use thiserror::Error;
 use super::apply::upload;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, write_calibrated, write_file};
+use super::report::{Report, print, write_calibrated, write_file, write_files};
 use super::table::Columns;
 use crate::board::{StreamLosses, rms_kinematics};
-use crate::files::{Dataset, RIGS, ROBOTS, Rig, Robot, Source};
+use crate::files::{Dataset, FileKind, Output, RIGS, ROBOTS, Rig, Robot, Source};
 use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
 use crate::simulate::tool_error;
+use crate::text::{one_line, shown_path};
 use crate::units::mm_from_m;
 use bench::{Bench, SIGMA_MM, Scene};
 
@@ -106,24 +107,23 @@ impl DemoArgs {
 
         let fit = fit(design, &fitted_poses, &FitOptions::default())?;
         let files = [
-            ("design.toml", Source::named_or_read("puma560", &ROBOTS, "robot")?.text().to_owned()),
-            ("rig.toml", Source::named_or_read("triangles", &RIGS, "rig")?.text().to_owned()),
-            (fitted_name, fitted_shells.csv),
-            (other_name, other_shells.csv),
+            ("design.toml", FileKind::Robot, Source::named_or_read("puma560", &ROBOTS, "robot")?.text().to_owned()),
+            ("rig.toml", FileKind::Rig, Source::named_or_read("triangles", &RIGS, "rig")?.text().to_owned()),
+            (fitted_name, FileKind::Poses, fitted_shells.csv),
+            (other_name, FileKind::Poses, other_shells.csv),
         ];
-        for (name, text) in &files {
-            write_file(&self.out.join(name), text)?;
-        }
+        let written = files.iter().map(|(name, kind, text)| (self.out.join(name), *kind, text.clone()));
+        write_files(&written.collect::<Vec<_>>(), false)?;
         let calibrated_name = "calibrated.toml";
         let calibrated_path = self.out.join(calibrated_name);
-        write_calibrated(&calibrated_path, design, &fitted_poses, &fit)?;
+        write_calibrated(&calibrated_path, false, design, &fitted_poses, &fit)?;
 
         let board = put_on_board(&mut bench, &scene.truth, &Robot::open(&calibrated_path.to_string_lossy())?)?;
-        let names = files.iter().map(|(name, _)| *name).chain([calibrated_name]);
+        let names = files.iter().map(|(name, ..)| *name).chain([calibrated_name]);
         let names = names.chain([SUMMARY_NAME]).map(|name| self.out.join(name).display().to_string()).collect();
         let losses = fitted_shells.losses + other_shells.losses;
         let report = DemoReport::new(&scene, &fit, &other_poses, board, losses, names, &self.out);
-        write_file(&self.out.join(SUMMARY_NAME), &report.text())?;
+        self.write_summary(&report.text())?;
         print(&report, self.output.json)?;
         Ok(if fit.objection().is_none() { Outcome::Good } else { Outcome::Doubtful })
     }
@@ -136,7 +136,11 @@ impl DemoArgs {
         if !is_empty && !self.out.join(SUMMARY_NAME).is_file() {
             return Err(ForeignFolderError { folder: self.out.clone() }.into());
         }
-        write_file(&self.out.join(SUMMARY_NAME), "")
+        self.write_summary("")
+    }
+
+    fn write_summary(&self, text: &str) -> Result<(), CommandError> {
+        write_file(Output { path: &self.out.join(SUMMARY_NAME), kind: FileKind::DemoSummary, force: false }, text)
     }
 }
 
@@ -224,7 +228,7 @@ impl Report for DemoReport {
             "\nThe calibrated parameters are in the board's flash; its poses and this program's differ by {:.2} µm at most.\n",
             self.board_difference_um
         );
-        text += &format!("\nLeft in {}: {}\n", self.folder, self.files.join(" "));
+        text += &format!("\nLeft in {}: {}\n", one_line(&self.folder), one_line(&self.files.join(" ")));
         let at = |name: &str| quoted(&Path::new(&self.folder).join(name));
         let (design, rig, fitted, other, calibrated) =
             (at("design.toml"), at("rig.toml"), at("poses-460.csv"), at("poses-610.csv"), at("calibrated.toml"));
@@ -238,7 +242,7 @@ impl Report for DemoReport {
 
 /// A path as a shell takes it.
 fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
+    let text = shown_path(path);
     let is_plain = text.chars().all(|c| c.is_alphanumeric() || "/._-".contains(c));
     if is_plain { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }

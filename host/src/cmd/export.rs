@@ -7,12 +7,13 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::inputs::OutputArgs;
+use super::inputs::{ForceArgs, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use crate::export::{Format, JointZero, export};
-use crate::files::Robot;
+use crate::files::{Output, Robot};
 use crate::kinematics::NearlyParallel;
+use crate::text::{one_line, shown_path};
 use crate::units::mm_from_m;
 
 /// Write a robot as URDF, DH table, data or source code
@@ -34,6 +35,8 @@ pub(super) struct ExportArgs {
     /// File to write; printed when not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ForceArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -82,7 +85,7 @@ impl ExportArgs {
             warn(remark);
         }
         if let Some(path) = &self.out {
-            write_file(path, &exported.text)?;
+            write_file(Output { path, kind: self.format.kind(), force: self.replace.force }, &exported.text)?;
         }
         let report = ExportReport {
             robot: robot.name.clone(),
@@ -105,12 +108,16 @@ fn pair(pair: &NearlyParallel) -> NearlyParallelReport {
 }
 
 impl Report for ExportReport {
+    fn is_document(&self) -> bool {
+        self.text.is_some()
+    }
+
     fn text(&self) -> String {
         if let Some(text) = &self.text {
             return text.clone();
         }
-        let out = self.out.as_ref().map_or_else(String::new, |path| path.display().to_string());
-        let mut text = format!("{} is written to {out}\n", self.robot);
+        let out = self.out.as_deref().map_or_else(String::new, shown_path);
+        let mut text = format!("{} is written to {out}\n", one_line(&self.robot));
         if let (Some(mm), Some(deg)) = (self.largest_difference_mm, self.largest_difference_deg) {
             text += &format!("largest difference to the robot over random joint vectors: {mm:.1e} mm, {deg:.1e} degrees\n");
         }

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::hold_out::HeldOutRows;
-use super::inputs::{Measured, MeasuredArgs, OutputArgs};
+use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs};
 use super::lines::{NotIdentified, PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated};
@@ -16,6 +16,7 @@ use crate::files::{Dataset, Rig};
 use crate::identify::{
     ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, plausible_error, remarks,
 };
+use crate::text::one_line;
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// Identify the robot's parameters from measured poses
@@ -44,6 +45,8 @@ pub(super) struct FitArgs {
     /// Write the calibrated robot to this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ForceArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -152,7 +155,7 @@ impl FitArgs {
         if let Some(path) = &self.out {
             report.asked_out = Some(path.display().to_string());
             if report.objection.is_none() {
-                write_calibrated(path, &measured.robot, &measured.dataset, &fit)?;
+                write_calibrated(path, self.replace.force, &measured.robot, &measured.dataset, &fit)?;
                 report.out = report.asked_out.clone();
             }
         }
@@ -333,8 +336,8 @@ impl Report for FitReport {
             text += &format!("\nNOT TO BE TRUSTED AS IT IS: {objection}\n");
         }
         text + &match (&self.out, &self.asked_out) {
-            (Some(out), _) => format!("\nwrote {out}\n"),
-            (None, Some(asked)) => format!("{asked} was not written\n"),
+            (Some(out), _) => format!("\nwrote {}\n", one_line(out)),
+            (None, Some(asked)) => format!("{} was not written\n", one_line(asked)),
             (None, None) => String::new(),
         }
     }

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::inputs::OutputArgs;
+use super::inputs::{ForceArgs, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
-use crate::files::{UrdfEnds, read_urdf};
+use crate::files::{FileKind, Output, UrdfEnds, read_urdf};
+use crate::text::{one_line, shown_path};
 
 /// Make a robot file from a URDF
 #[derive(Args)]
@@ -27,6 +28,8 @@ pub(super) struct ImportArgs {
     /// File to write; printed when not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ForceArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -54,7 +57,7 @@ impl ImportArgs {
             warn(remark);
         }
         if let Some(path) = &self.out {
-            write_file(path, &imported.toml)?;
+            write_file(Output { path, kind: FileKind::Robot, force: self.replace.force }, &imported.toml)?;
         }
         let report = ImportReport {
             robot: imported.robot.name,
@@ -71,12 +74,16 @@ impl ImportArgs {
 }
 
 impl Report for ImportReport {
+    fn is_document(&self) -> bool {
+        self.text.is_some()
+    }
+
     fn text(&self) -> String {
         if let Some(text) = &self.text {
             return text.clone();
         }
-        let out = self.out.as_ref().map_or_else(String::new, |path| path.display().to_string());
-        let joints = self.joints.join(", ");
-        format!("{} from link {} to link {} is written to {out}\njoints: {joints}\n", self.robot, self.base, self.tip)
+        let out = self.out.as_deref().map_or_else(String::new, shown_path);
+        let chain = format!("{} from link {} to link {}", self.robot, self.base, self.tip);
+        format!("{} is written to {out}\njoints: {}\n", one_line(&chain), one_line(&self.joints.join(", ")))
     }
 }

@@ -20,6 +20,14 @@ pub(super) struct OutputArgs {
     pub(super) json: bool,
 }
 
+/// `--force`.
+#[derive(Args)]
+pub(super) struct ForceArgs {
+    /// Write even where a file of another kind stands; never over an input, a recording or a session's file
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
 /// A robot, a rig and files of poses.
 #[derive(Args)]
 pub(super) struct MeasuredArgs {
@@ -79,7 +87,7 @@ impl MeasuredArgs {
             return Ok(given.clone());
         }
         let files: Vec<PathBuf> = self.poses.iter().map(|path| path.join(name)).filter(|file| file.is_file()).collect();
-        let texts: Vec<Source> = files.iter().map(|file| Source::read(file)).collect::<Result<_, _>>()?;
+        let texts: Vec<Source> = files.iter().map(|file| Source::read_toml(file)).collect::<Result<_, _>>()?;
         match files.split_first() {
             None => Err(ListError::Missing { flag, name }.into()),
             Some(_) if texts.windows(2).any(|pair| pair[0].text() != pair[1].text()) => {

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::inputs::OutputArgs;
+use super::inputs::{ForceArgs, OutputArgs};
 use super::outcome::{CommandError, INTERRUPTED, Outcome};
 use super::port::EndRequest;
 use super::report::{Report, print, warn};
 use crate::board::StreamLosses;
 use crate::session::{LogExportError, LogFormat, LogReader, LogSummary, export_log};
+use crate::text::{one_line, shown_path};
 
 /// Check or export the log of a session (stream.bbl)
 #[derive(Args)]
@@ -38,6 +39,8 @@ enum LogCommand {
         session: PathBuf,
         #[command(flatten)]
         files: ExportFiles,
+        #[command(flatten)]
+        replace: ForceArgs,
         #[command(flatten)]
         output: OutputArgs,
     },
@@ -85,7 +88,7 @@ impl LogArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         match &self.what {
             LogCommand::Check { session, output } => check(session, output.json),
-            LogCommand::Export { session, files, output } => export(session, files, output.json),
+            LogCommand::Export { session, files, replace, output } => export(session, files, replace.force, output.json),
         }
     }
 }
@@ -98,13 +101,13 @@ fn check(session: &Path, json: bool) -> Result<Outcome, CommandError> {
     Ok(outcome(&report.summary))
 }
 
-fn export(session: &Path, files: &ExportFiles, json: bool) -> Result<Outcome, CommandError> {
+fn export(session: &Path, files: &ExportFiles, force: bool, json: bool) -> Result<Outcome, CommandError> {
     let log = LogReader::open(session)?.path().display().to_string();
     let end = EndRequest::listen();
-    let summary = export_log(session, &files.named(), &|| end.is_made()).map_err(|error| match error {
-        LogExportError::Write(error) => CommandError::output(error),
+    let summary = export_log(session, &files.named(), force, &|| end.is_made()).map_err(|error| match error {
+        LogExportError::Write(error) => CommandError::not_written(error),
         LogExportError::Interrupted => CommandError { exit_code: INTERRUPTED, ..error.into() },
-        LogExportError::Log(_) | LogExportError::SameFile { .. } => error.into(),
+        LogExportError::Log(_) => error.into(),
     })?;
     let LogSummary { samples, settled, poses: tool_poses, damaged, gaps, losses, .. } = summary;
     print(&ExportReport { log, files, samples, settled, tool_poses, damaged, gaps, losses }, json)?;
@@ -139,7 +142,7 @@ impl Report for CheckReport {
         let LogSummary { frames, unfinished_bytes, runs, samples, settled, poses, duration_s, .. } = &self.summary;
         let mut text = format!(
             "{}: {frames} whole frames in {runs} runs, {duration_s:.1} s\n{samples} samples, {settled} settled poses, {poses} tool poses\n",
-            self.log
+            one_line(&self.log)
         );
         if *unfinished_bytes > 0 {
             text += &format!("the last frame is cut off after {unfinished_bytes} bytes: the program was ended while it wrote\n");
@@ -153,11 +156,11 @@ impl Report for ExportReport<'_> {
     fn text(&self) -> String {
         let Self { log, samples, settled, tool_poses, .. } = self;
         let named = |(format, path): (LogFormat, PathBuf)| match format {
-            LogFormat::Csv | LogFormat::Parquet => format!("{}: {samples} samples\n", path.display()),
+            LogFormat::Csv | LogFormat::Parquet => format!("{}: {samples} samples\n", shown_path(&path)),
             LogFormat::Mcap => {
-                format!("{}: {samples} samples, {settled} settled poses, {tool_poses} tool poses\n", path.display())
+                format!("{}: {samples} samples, {settled} settled poses, {tool_poses} tool poses\n", shown_path(&path))
             }
         };
-        format!("of {log}:\n") + &self.files.named().into_iter().map(named).collect::<String>()
+        format!("of {}:\n", one_line(log)) + &self.files.named().into_iter().map(named).collect::<String>()
     }
 }

@@ -1,6 +1,6 @@
 //! `host-cal lvdt`: measure the LVDT's curve from known lengths.
 
-use std::io::{IsTerminal, Write, stderr, stdin};
+use std::io::{IsTerminal, stdin};
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{Answer, Command, Event, Refusal, StreamSelection, ToHost};
@@ -11,6 +11,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
+use super::out::{ask, tell};
 use super::outcome::{CommandError, Outcome};
 use super::port::{EndRequest, PortArgs};
 use super::report::{Report, print};
@@ -146,7 +147,7 @@ impl LvdtArgs {
         };
         let mut poses: Vec<SettledPose> = Vec::new();
         for &length_mm in &self.lengths {
-            let _ = writeln!(stderr(), "set the bar to {length_mm} mm and hold it still");
+            tell(&format!("set the bar to {length_mm} mm and hold it still"));
             let is_told = stdin().is_terminal();
             let ended = LvdtError::Ended { found: poses.len(), wanted: self.lengths.len() };
             if is_told && !is_entered(&end) {
@@ -160,7 +161,7 @@ impl LvdtArgs {
             let is_new =
                 |pose: &SettledPose| old_code.is_none_or(|old| (pose.code_mean - old).abs() > f64::from(criteria.band_codes));
             let pose = next_settled(link, &end, is_new)?.ok_or(ended)?;
-            let _ = writeln!(stderr(), "  code {:.1} ± {:.1} over {} samples", pose.code_mean, pose.code_std, pose.samples);
+            tell(&format!("  code {:.1} ± {:.1} over {} samples", pose.code_mean, pose.code_std, pose.samples));
             poses.push(pose);
         }
         Ok(poses)
@@ -169,7 +170,7 @@ impl LvdtArgs {
 
 /// Waits for Enter; false when the user ends instead.
 fn is_entered(end: &EndRequest) -> bool {
-    let _ = write!(stderr(), "press Enter when it stands, or Ctrl-C and Enter to end: ");
+    ask("press Enter when it stands, or Ctrl-C and Enter to end: ");
     let is_open = stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0);
     is_open && !end.is_made()
 }

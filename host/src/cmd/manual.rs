@@ -9,9 +9,11 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::inputs::OutputArgs;
+use super::inputs::{ForceArgs, OutputArgs};
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, write_file};
+use super::report::{Report, print, write_files};
+use crate::files::FileKind;
+use crate::text::shown_path;
 
 /// Print a manual page, or write those of all commands
 #[derive(Args)]
@@ -26,6 +28,8 @@ pub(super) struct ManualArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
+    replace: ForceArgs,
+    #[command(flatten)]
     output: OutputArgs,
 }
 
@@ -35,8 +39,6 @@ enum ManualError {
     #[error("there is no command `{0}`")]
     #[diagnostic(help("`host-cal help` lists the commands."))]
     NoCommand(String),
-    #[error("{}: cannot be made: {error}", path.display())]
-    Folder { path: PathBuf, error: std::io::Error },
 }
 
 #[derive(Serialize)]
@@ -59,12 +61,10 @@ impl ManualArgs {
         let report = match &self.out {
             Some(folder) => {
                 let pages = all_pages(&command);
-                let made = std::fs::create_dir_all(folder);
-                made.map_err(|error| CommandError::output(ManualError::Folder { path: folder.clone(), error }))?;
-                for (name, text) in &pages {
-                    write_file(&folder.join(name), text)?;
-                }
-                ManualReport { out: self.out.clone(), pages: pages.into_iter().map(|(name, _)| name).collect(), text: None }
+                let names = pages.iter().map(|(name, _)| name.clone()).collect();
+                let file = |(name, text): (String, String)| (folder.join(name), FileKind::ManualPage, text);
+                write_files(&pages.into_iter().map(file).collect::<Vec<_>>(), self.replace.force)?;
+                ManualReport { out: self.out.clone(), pages: names, text: None }
             }
             None => {
                 let (name, text) = page(self.find(&command)?);
@@ -147,10 +147,14 @@ fn after_help(command: &Command) -> Roff {
 }
 
 impl Report for ManualReport {
+    fn is_document(&self) -> bool {
+        self.text.is_some()
+    }
+
     fn text(&self) -> String {
         match (&self.text, &self.out) {
             (Some(text), _) => text.clone(),
-            (None, Some(out)) => format!("{} pages are written to {}\n", self.pages.len(), out.display()),
+            (None, Some(out)) => format!("{} pages are written to {}\n", self.pages.len(), shown_path(out)),
             (None, None) => String::new(),
         }
     }

@@ -20,6 +20,7 @@ mod lines;
 mod log;
 mod lvdt;
 mod manual;
+mod out;
 mod outcome;
 mod paper;
 mod plan;
@@ -42,10 +43,13 @@ mod validate;
 #[cfg(unix)]
 mod virtual_board;
 
+use std::ffi::OsString;
+
 use clap::{CommandFactory, Parser, Subcommand};
 
+use crate::text::one_line;
+pub use out::show_error;
 pub use outcome::{CommandError, Outcome};
-pub use report::show_error;
 #[cfg(not(unix))]
 use unix_only::{demo, virtual_board};
 
@@ -91,6 +95,17 @@ enum Command {
 }
 
 impl Cli {
+    /// The program's arguments; ends the program when they are not to be understood, or ask for help.
+    #[must_use]
+    pub fn from_args() -> Self {
+        let args: Vec<OsString> = std::env::args_os().collect();
+        Self::try_parse_from(&args).unwrap_or_else(|error| {
+            // The same error once more, of arguments that are safe to show.
+            let shown = args.iter().map(|arg| one_line(&arg.to_string_lossy()).into_owned());
+            Self::try_parse_from(shown).err().unwrap_or(error).exit()
+        })
+    }
+
     /// Runs the subcommand.
     ///
     /// # Errors

@@ -4,6 +4,8 @@ use std::process::ExitCode;
 
 use miette::{Diagnostic, Report};
 
+use crate::files::WriteError;
+
 /// Exit code of a command that Ctrl-C or a signal ended before it had done anything: what shells expect.
 pub(super) const INTERRUPTED: u8 = 130;
 
@@ -38,6 +40,11 @@ impl CommandError {
     /// Output that could not be written.
     pub(super) fn output(diagnostic: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self { report: Report::new(diagnostic), exit_code: 3 }
+    }
+
+    /// A file that was not written: what stands in its place is the user's to change, as other input is.
+    pub(super) fn not_written(error: WriteError) -> Self {
+        if error.is_refusal() { error.into() } else { Self::output(error) }
     }
 }
 

@@ -1,16 +1,16 @@
 //! `host-cal plan`: which poses to measure, and the way between them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 
-use super::inputs::{ListError, OutputArgs, parse_pairings};
+use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
 use super::plan_margins::{CheckReport, Least};
 use super::plan_report::PlanReport;
 use super::report::{print, progress, warn, write_file};
-use crate::files::{PlanRow, Rig, Robot, Source, check_writable, read_plan, write_plan};
+use crate::files::{FileKind, Output, PlanRow, Rig, Robot, Source, read_plan, write_plan};
 use crate::plan::{Cell, CheckFound, Grid, Margins, Pace, PlanOptions, check, plan};
 use crate::units::{m_from_mm, mm_from_m};
 
@@ -59,6 +59,8 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["bar", "pairings", "per_pair", "latitudes_deg", "optimal"])]
     check: Option<PathBuf>,
     #[command(flatten)]
+    replace: ForceArgs,
+    #[command(flatten)]
     output: OutputArgs,
 }
 
@@ -106,7 +108,7 @@ impl PlanArgs {
             return Err(number("--travel-margin-mm", mm_from_m(margins.travel_m), expected).into());
         }
         match &self.check {
-            Some(path) => self.look_again(&robot, &rig, travel_m, margins, pace, &Source::read(path)?),
+            Some(path) => self.look_again(&robot, &rig, travel_m, margins, pace, &Source::read_rows(path)?),
             None => self.plan(&robot, &rig, travel_m, margins, pace),
         }
     }
@@ -124,7 +126,7 @@ impl PlanArgs {
             seed: self.seed,
         };
         if let Some(path) = &self.out {
-            check_writable(path).map_err(CommandError::output)?;
+            self.output_to(path).check().map_err(CommandError::not_written)?;
         }
         let start = Instant::now();
         let bar = progress(options.ticks() as u64, "planning poses and ways");
@@ -135,7 +137,7 @@ impl PlanArgs {
         let found = self.checked(robot, rig, travel_m, margins, pace, &plan.rows)?;
 
         if let Some(path) = &self.out {
-            write_file(path, &write_plan(robot, rig, &plan.rows))?;
+            write_file(self.output_to(path), &write_plan(robot, rig, &plan.rows))?;
         }
         let report = PlanReport::new(robot, rig, &options, &plan, &found, planning_s, self.out.as_deref());
         for warning in &report.warnings {
@@ -143,6 +145,10 @@ impl PlanArgs {
         }
         print(&report, self.output.json)?;
         Ok(if report.warnings.is_empty() { Outcome::Good } else { Outcome::Doubtful })
+    }
+
+    fn output_to<'a>(&self, path: &'a Path) -> Output<'a> {
+        Output { path, kind: FileKind::Plan, force: self.replace.force }
     }
 
     fn look_again(

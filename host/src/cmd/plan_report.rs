@@ -9,6 +9,7 @@ use super::report::Report;
 use super::table::{Columns, fixed};
 use crate::files::{PlanRow, Rig, Robot, RowKind, RowMargins};
 use crate::plan::{CheckFound, Comparison, Plan, PlanOptions, Quality, ShellSummary};
+use crate::text::one_line;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 
 /// A plan, in numbers.
@@ -307,7 +308,7 @@ impl Report for PlanReport {
         );
         text += &self.quality_text();
         text += &match &self.out {
-            Some(out) => format!("\nwritten to {out}\n"),
+            Some(out) => format!("\nwritten to {}\n", one_line(out)),
             None => "\nnot written; --out FILE writes the rows, --json prints them\n".to_owned(),
         };
         text

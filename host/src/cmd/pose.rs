@@ -10,6 +10,7 @@ use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
 use super::report::{Report, print, warn};
 use crate::board::{BoardError, RobotOnBoard};
+use crate::text::one_line;
 use crate::units::{ScreenUnit, joints_text, mm_from_m};
 use ballbar::JointKind;
 
@@ -82,7 +83,7 @@ impl Report for PoseReport {
         let [x, y, z] = self.position_mm;
         let si: Vec<f64> = self.kinds.iter().zip(&self.q).map(|(&kind, &q)| ScreenUnit::from(kind).to_si(q)).collect();
         let what = if self.calibrated { "calibrated" } else { "design parameters" };
-        let mut text = format!("{} ({what}) at {}\n", self.robot, joints_text(&self.kinds, &si));
+        let mut text = format!("{} ({what}) at {}\n", one_line(&self.robot), joints_text(&self.kinds, &si));
         text += &format!("tool at {x:.4} {y:.4} {z:.4} mm\n");
         for row in self.rotation {
             text += &row.map(|entry| format!("{entry:10.6}")).join(" ");

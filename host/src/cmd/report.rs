@@ -1,21 +1,28 @@
 //! What a command found, for people and for machines, from one place.
 
-use std::io::{IsTerminal, Write, stderr, stdout};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use miette::{Diagnostic, Report as MietteReport};
+use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::out;
+pub(super) use super::out::warn;
 use super::outcome::CommandError;
-use crate::files::{Dataset, Robot, write_atomically};
+use crate::files::{Dataset, FileKind, Output, PendingFile, Robot, commit_all, write_atomically};
 use crate::identify::Fit;
+use crate::text::visible_json;
 
 /// A result that can be shown as text and as JSON.
 pub(super) trait Report: Serialize {
     /// For people, ended by a newline.
     fn text(&self) -> String;
+
+    /// Whether the text is the very file that other programs take.
+    fn is_document(&self) -> bool {
+        false
+    }
 }
 
 #[derive(Debug, Error, Diagnostic)]
@@ -24,22 +31,55 @@ struct PrintError(String);
 
 /// Prints a report to stdout: one JSON document, or text.
 pub(super) fn print(report: &impl Report, json: bool) -> Result<(), CommandError> {
-    let text = if json {
-        let document =
-            serde_json::to_string_pretty(report).map_err(|error| CommandError::output(PrintError(error.to_string())))?;
-        document + "\n"
+    let failed = |reason: String| CommandError::output(PrintError(reason));
+    let printed = if json {
+        let document = serde_json::to_string_pretty(report).map_err(|error| failed(error.to_string()))?;
+        out::print_text(&(visible_json(&document) + "\n"))
+    } else if report.is_document() {
+        out::print_document(&report.text())
     } else {
-        report.text()
+        out::print_text(&report.text())
     };
-    match stdout().write_all(text.as_bytes()).and_then(|()| stdout().flush()) {
-        // A reader that has seen enough, like `head`, is no failure.
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(CommandError::output(PrintError(error.to_string()))),
-        _ => Ok(()),
-    }
+    printed.map_err(|error| failed(error.to_string()))
 }
 
-/// Writes a file by rename.
-pub(super) fn write_file(path: &Path, contents: &str) -> Result<(), CommandError> {
+/// Writes a file that was asked for.
+pub(super) fn write_file(output: Output<'_>, contents: &str) -> Result<(), CommandError> {
+    output.write(contents).map_err(CommandError::not_written)
+}
+
+/// A file's name, what it is, and its contents.
+pub(super) type NamedFile = (PathBuf, FileKind, String);
+
+/// Writes files that were asked for: all of them, or none when one may not be written. Folders are made where they are missing.
+pub(super) fn write_files(files: &[NamedFile], force: bool) -> Result<(), CommandError> {
+    for folder in files.iter().filter_map(|(path, ..)| path.parent()).filter(|folder| !folder.as_os_str().is_empty()) {
+        make_folder(folder)?;
+    }
+    let outputs = files.iter().map(|(path, kind, _)| Output { path, kind: *kind, force });
+    let written = || {
+        let mut pending = PendingFile::begin_all(outputs)?;
+        pending.iter_mut().zip(files).try_for_each(|(file, (.., contents))| file.fill(contents))?;
+        commit_all(pending)
+    };
+    written().map_err(CommandError::not_written)
+}
+
+#[derive(Debug, Error, Diagnostic)]
+#[error("{}: cannot be made: {error}", folder.display())]
+#[diagnostic(help("Give a folder that is there, or that can be made."))]
+struct FolderError {
+    folder: PathBuf,
+    error: std::io::Error,
+}
+
+/// Makes a folder, and those above it, where they are missing.
+pub(super) fn make_folder(folder: &Path) -> Result<(), CommandError> {
+    std::fs::create_dir_all(folder).map_err(|error| CommandError::output(FolderError { folder: folder.to_owned(), error }))
+}
+
+/// Writes a file of the session that is being recorded.
+pub(super) fn write_session_file(path: &Path, contents: &str) -> Result<(), CommandError> {
     write_atomically(path, contents).map_err(CommandError::output)
 }
 
@@ -48,28 +88,24 @@ pub(super) fn write_file(path: &Path, contents: &str) -> Result<(), CommandError
 struct EditError(String, String);
 
 /// Writes the robot's file with the fitted parameters and a `[calibration]` table.
-pub(super) fn write_calibrated(path: &Path, robot: &Robot, dataset: &Dataset, fit: &Fit) -> Result<(), CommandError> {
+pub(super) fn write_calibrated(
+    path: &Path,
+    force: bool,
+    robot: &Robot,
+    dataset: &Dataset,
+    fit: &Fit,
+) -> Result<(), CommandError> {
     let text = robot.calibrated_toml(&fit.solution.chain, &fit.calibration(robot, dataset));
     let broken = |error: toml_edit::TomlError| CommandError::output(EditError(robot.source_name().to_owned(), error.to_string()));
-    write_file(path, &text.map_err(broken)?)
-}
-
-/// Says something that is no result and no error.
-pub(super) fn warn(message: &str) {
-    let _ = writeln!(stderr(), "warning: {message}");
+    write_file(Output { path, kind: FileKind::Robot, force }, &text.map_err(broken)?)
 }
 
 /// A progress bar on stderr, drawn only where that is a terminal.
 pub(super) fn progress(steps: u64, what: &'static str) -> ProgressBar {
-    if !stderr().is_terminal() {
+    if !out::is_seen() {
         return ProgressBar::hidden();
     }
     let style =
         ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {eta:>4}").unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(steps).with_style(style).with_message(what)
-}
-
-/// Shows an error on stderr.
-pub fn show_error(report: &MietteReport) {
-    let _ = writeln!(stderr(), "{report:?}");
 }

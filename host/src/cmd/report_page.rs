@@ -9,12 +9,13 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::fit::{FitReport, runaway_remark};
-use super::inputs::{Measured, MeasuredArgs, OutputArgs, poses_of};
+use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, poses_of};
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, write_file};
-use crate::files::{Dataset, PoseRow, check_writable};
+use super::report::{Report, print, write_files};
+use crate::files::{Dataset, FileKind, Output, PoseRow};
 use crate::identify::{FitOptions, Hold, fit, remarks};
 use crate::report::{Answer, Facts, Figure, Inputs, Verdict, figures, html, parameters_table};
+use crate::text::one_line;
 use crate::units::mm_from_m;
 
 /// Show a calibration as one page: is the robot calibrated, how good is it, how do we know
@@ -43,6 +44,8 @@ pub(super) struct ReportArgs {
     /// Write the figures' numbers and the parameters into this folder, one CSV file each
     #[arg(long, value_name = "DIR")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ForceArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -81,14 +84,6 @@ struct Unseen {
 }
 
 #[derive(Debug, Error, Diagnostic)]
-#[error("{}: cannot be made: {error}", folder.display())]
-#[diagnostic(help("Give a folder that is there, or that can be made."))]
-struct FolderError {
-    folder: PathBuf,
-    error: std::io::Error,
-}
-
-#[derive(Debug, Error, Diagnostic)]
 #[error("{}: holds no pose", .0.display())]
 #[diagnostic(help("Give --validate a file with measured poses."))]
 struct EmptyError(PathBuf);
@@ -105,9 +100,10 @@ struct SeenError {
 impl ReportArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let hold: Hold = self.hold.parse()?;
-        check_writable(&self.out).map_err(CommandError::output)?;
         let measured = self.measured.read()?;
         let others = self.others(&measured)?;
+        let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
+        page.check().map_err(CommandError::not_written)?;
         let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, ..FitOptions::default() })?;
 
         let told = FitReport::new(&measured, &fit);
@@ -128,15 +124,19 @@ impl ReportArgs {
 
         let now = jiff::Timestamp::now();
         let when = now.round(jiff::Unit::Second).unwrap_or(now).to_string();
-        write_file(&self.out, &html(&facts, &figures, &when))?;
+        let mut files = vec![(self.out.clone(), FileKind::Page, html(&facts, &figures, &when))];
         let drawn = || figures.iter().filter_map(|figure| Some((figure.name, figure.drawing.as_ref()?)));
         if let Some(folder) = &self.svg {
-            write_each(folder, drawn().map(|(name, drawing)| (format!("{name}.svg"), drawing.svg.clone())))?;
+            files.extend(
+                drawn().map(|(name, drawing)| (folder.join(format!("{name}.svg")), FileKind::Figure, drawing.svg.clone())),
+            );
         }
         if let Some(folder) = &self.csv {
-            let parameters = ("parameters.csv".to_owned(), parameters_table(&facts).csv());
-            write_each(folder, drawn().map(|(name, drawing)| (format!("{name}.csv"), drawing.data.csv())).chain([parameters]))?;
+            let tables = drawn().map(|(name, drawing)| (name, drawing.data.csv()));
+            let tables = tables.chain([("parameters", parameters_table(&facts).csv())]);
+            files.extend(tables.map(|(name, csv)| (folder.join(format!("{name}.csv")), FileKind::FigureTable, csv)));
         }
+        write_files(&files, self.replace.force)?;
 
         let report = PageReport::new(&self.out, &facts, &figures);
         print(&report, self.output.json)?;
@@ -161,16 +161,6 @@ impl ReportArgs {
         };
         self.validate.iter().map(read).collect()
     }
-}
-
-/// Files of these names and contents in a folder, which is made if need be.
-fn write_each(folder: &Path, files: impl Iterator<Item = (String, String)>) -> Result<(), CommandError> {
-    let failed = |error| CommandError::output(FolderError { folder: folder.to_owned(), error });
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    for (name, text) in files {
-        write_file(&folder.join(name), &text)?;
-    }
-    Ok(())
 }
 
 impl PageReport {
@@ -211,11 +201,11 @@ impl Report for PageReport {
         }
         text += &format!("RMS {:.4} mm before, {:.4} mm after on {} poses\n", self.rms_initial_mm, self.rms_mm, self.poses);
         for Unseen { name, poses, rms_initial_mm, rms_mm, .. } in &self.unseen {
-            text += &format!("RMS {rms_initial_mm:.4} mm before, {rms_mm:.4} mm after on {name}, {poses} poses\n");
+            text += &format!("RMS {rms_initial_mm:.4} mm before, {rms_mm:.4} mm after on {}, {poses} poses\n", one_line(name));
         }
         for NotDrawn { name, why } in &self.not_drawn {
             text += &format!("{name}: {why}\n");
         }
-        text + &format!("wrote {}\n", self.out)
+        text + &format!("wrote {}\n", one_line(&self.out))
     }
 }

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::inputs::{ListError, OutputArgs, parse_pairings};
+use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, progress, write_file};
-use crate::files::{PairingId, PoseRow, Rig, Robot, write_poses};
+use crate::files::{FileKind, Output, PairingId, PoseRow, Rig, Robot, write_poses};
 use crate::simulate::{ShellPose, Shells};
+use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
 
 /// Simulate lengths on the hemispherical shells of the chosen pairings
@@ -48,6 +49,8 @@ pub(super) struct SimulateArgs {
     /// Write the poses to this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ForceArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -90,7 +93,7 @@ impl SimulateArgs {
         let rig = Rig::open(&self.rig)?;
         let report = self.simulate(&truth, &planned_with, &rig)?;
         if let Some(path) = &self.out {
-            write_file(path, &report.csv)?;
+            write_file(Output { path, kind: FileKind::Poses, force: self.replace.force }, &report.csv)?;
         }
         print(&report, self.output.json)?;
         Ok(Outcome::Good)
@@ -171,13 +174,18 @@ fn row_line(pose: &ShellPose, robot: &Robot, rig: &Rig) -> RowLine {
 }
 
 impl Report for SimulateReport {
+    fn is_document(&self) -> bool {
+        self.out.is_none()
+    }
+
     fn text(&self) -> String {
         match &self.out {
             Some(out) => format!(
-                "{} poses of {} on {} shells, to {out}\n",
+                "{} poses of {} on {} shells, to {}\n",
                 self.poses,
-                self.robot,
-                self.pairings.len() * self.bar_mm.len()
+                one_line(&self.robot),
+                self.pairings.len() * self.bar_mm.len(),
+                one_line(out)
             ),
             None => self.csv.clone(),
         }

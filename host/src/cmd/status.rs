@@ -16,6 +16,7 @@ use super::port::PortArgs;
 use super::report::{Report, print};
 use super::table::Columns;
 use crate::board::{BoardError, BoardLink};
+use crate::text::one_line;
 
 /// How the board is: counters, encoders, parameters, self-test
 #[derive(Args)]
@@ -233,12 +234,18 @@ impl Report for StatusReport {
     fn text(&self) -> String {
         let mut text = format!(
             "{}: board {} {}, firmware {}, protocol {}\nup {:.1} s, started by {}\n",
-            self.port, self.board, self.unique_id, self.firmware, self.protocol, self.uptime_s, self.started_by
+            one_line(&self.port),
+            one_line(&self.board),
+            self.unique_id,
+            one_line(&self.firmware),
+            self.protocol,
+            self.uptime_s,
+            self.started_by
         );
         text += &match &self.robot {
             Some(robot) => format!(
                 "robot {} ({}), {} joints, commit {}, CRC {}\n",
-                robot.name,
+                one_line(&robot.name),
                 if robot.calibrated { "calibrated" } else { "not calibrated" },
                 robot.joints,
                 robot.sequence,

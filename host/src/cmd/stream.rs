@@ -21,6 +21,7 @@ use super::report::{Report, print, warn};
 use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
 use crate::files::Rig;
 use crate::session::{Connection, Recorder, Run};
+use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
 use account::Account;
 use live::{Latest, Model};
@@ -260,8 +261,8 @@ impl From<(FrameCounts, u32)> for FrameLine {
 
 impl Report for StreamReport {
     fn text(&self) -> String {
-        let mut text = format!("{} ({} {})", self.port, self.board, self.firmware);
-        text += &self.robot.as_ref().map_or("\n".into(), |robot| format!(", robot {robot}\n"));
+        let mut text = one_line(&format!("{} ({} {})", self.port, self.board, self.firmware)).into_owned();
+        text += &self.robot.as_ref().map_or("\n".into(), |robot| format!(", robot {}\n", one_line(robot)));
         text += &format!("{:.1} s: {} samples", self.duration_s, self.samples);
         text += &self.measured_rate_hz.map_or(String::new(), |hz| format!(" at {hz:.1} Hz"));
         text += &format!(", {} settled poses, {} tool poses\n", self.settled, self.tool_poses);
@@ -284,7 +285,7 @@ impl Report for StreamReport {
             text += &format!("the port was lost {} times\n", self.gaps);
         }
         if let Some(session) = &self.session {
-            text += &format!("recorded in {session}, {} poses added to poses.csv\n", self.poses_written);
+            text += &format!("recorded in {}, {} poses added to poses.csv\n", one_line(session), self.poses_written);
         }
         if self.poses_withheld > 0 {
             text += &format!("{} poses were NOT WRITTEN because the encoders are not homed\n", self.poses_withheld);

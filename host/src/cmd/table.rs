@@ -2,6 +2,7 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 
+use crate::text::one_line;
 pub(super) use crate::units::fixed;
 
 /// A table under construction.
@@ -23,7 +24,7 @@ impl Columns {
 
     /// One line.
     pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.0.add_row(cells.into_iter().collect::<Vec<_>>());
+        self.0.add_row(cells.into_iter().map(|cell| one_line(&cell).into_owned()));
     }
 
     /// The text, a newline behind each line and no white space before one.

@@ -1,6 +1,5 @@
 //! `host-cal virtual-board`: the firmware with a simulated robot and ball-bar, behind a port.
 
-use std::io::{Write, stderr};
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 use std::thread::sleep;
@@ -12,6 +11,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs, parse_pairings};
+use super::out::tell_lines;
 use super::outcome::{CommandError, Outcome};
 use super::port::EndRequest;
 use super::report::{Report, print, progress};
@@ -183,7 +183,7 @@ impl VirtualBoardArgs {
             controller: controller.map(|controller| controller.address().to_string()),
         };
         print(&report, self.output.json)?;
-        say(&self.explanation(&report));
+        tell_lines(&self.explanation(&report));
         match script {
             Some(script) if self.at_once => board.play(script),
             Some(script) => board.play_with_stream(script),
@@ -313,7 +313,7 @@ impl VirtualBoardArgs {
         }
         let flips = board.bit_flips();
         let damage = if self.bit_errors.is_some() { format!(", {flips} bits flipped") } else { String::new() };
-        say(&format!(
+        tell_lines(&format!(
             "Ended after {:.1} s of the robot's time in {:.1} s{damage}.\n",
             board.robot_time().as_secs_f64(),
             began.elapsed().as_secs_f64()
@@ -330,9 +330,4 @@ impl Report for VirtualBoardReport {
 
 fn refuse<T>(flag: &'static str, found: String, expected: &'static str) -> Result<T, CommandError> {
     Err(ListError::Number { flag, found, expected }.into())
-}
-
-/// To people, on stderr; without a stderr nobody is there to be told.
-fn say(text: &str) {
-    let _ = stderr().write_all(text.as_bytes());
 }

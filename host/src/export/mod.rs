@@ -8,7 +8,7 @@ mod urdf;
 use miette::Diagnostic;
 use thiserror::Error;
 
-use crate::files::Robot;
+use crate::files::{FileKind, Robot};
 use crate::kinematics::{Convention, NearlyParallel};
 
 /// What to write a robot as.
@@ -34,6 +34,23 @@ pub enum Format {
     Rust,
     /// MATLAB or Octave function that computes the tool's pose, metres and radians
     Octave,
+}
+
+impl Format {
+    /// What a file of this format is.
+    pub fn kind(self) -> FileKind {
+        match self {
+            Self::Urdf => FileKind::Urdf,
+            Self::Ros2 => FileKind::Ros2,
+            Self::Dh | Self::Mdh => FileKind::DhTable,
+            Self::Json => FileKind::RobotJson,
+            Self::Yaml => FileKind::RobotYaml,
+            Self::Csv => FileKind::RobotCsv,
+            Self::C => FileKind::CHeader,
+            Self::Rust => FileKind::RustConstants,
+            Self::Octave => FileKind::OctaveFunction,
+        }
+    }
 }
 
 /// Where the joint values of a URDF are zero.

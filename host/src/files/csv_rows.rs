@@ -1,6 +1,8 @@
 //! What files of poses and plans have in common: a header, joints' columns as the robot has them, a chuck and a sphere of the rig,
 //! and the place of whatever is wrong.
 
+use std::collections::HashSet;
+use std::num::ParseFloatError;
 use std::ops::Range;
 
 use ballbar::{JointKind, JointVector};
@@ -8,16 +10,21 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use super::numbers::Range as Of;
 use super::poses::joint_column;
-use super::problem::Problem;
+use super::problem::{Problem, short};
 use super::rig::{NamedPoint, PairingId, Rig};
 use super::robot::Robot;
 use super::source::{InputError, Source};
 use crate::units::ScreenUnit;
 
+/// As much of a name or a field as a message shows.
+const SHOWN: usize = 80;
+
 /// A CSV text, being read.
 pub(super) struct CsvRows<'a> {
     pub(super) source: &'a Source,
     pub(super) robot: &'a Robot,
+    /// What parts the fields.
+    separator: char,
     header: StringRecord,
     records: Vec<StringRecord>,
     expected: &'a Expected<'a>,
@@ -40,21 +47,23 @@ pub(super) struct Expected<'a> {
 impl<'a> CsvRows<'a> {
     /// Splits the text into records and checks the header.
     pub(super) fn split(source: &'a Source, robot: &'a Robot, expected: &'a Expected<'a>) -> Result<Self, InputError> {
-        let mut reader =
-            ReaderBuilder::new().comment(Some(b'#')).trim(Trim::All).flexible(true).from_reader(source.text().as_bytes());
+        let separator = separator(source.text());
+        let mut builder = ReaderBuilder::new();
+        builder.delimiter(separator as u8).comment(Some(b'#')).trim(Trim::All).flexible(true);
+        let mut reader = builder.from_reader(source.text().as_bytes());
         let broken = |error: csv::Error| InputError::of_file(source.name(), Problem::Csv(error.to_string()));
         let nothing = || InputError::of_file(source.name(), Problem::NoRows(expected.rows_are));
         if source.text().trim().is_empty() {
             return Err(nothing());
         }
-        let header = reader.headers().map_err(broken)?.clone();
-        let mut rows = Self { source, robot, header, records: Vec::new(), expected };
+        let header = without_empty_end(reader.headers().map_err(broken)?);
+        let mut rows = Self { source, robot, separator, header, records: Vec::new(), expected };
         rows.check_header()?;
         expected.required.iter().try_for_each(|name| rows.required(name).map(drop))?;
         for record in reader.records() {
             let record = record.map_err(broken)?;
-            // A line of white space is as empty as an empty one.
-            if record.len() > 1 || !record[0].is_empty() {
+            // A line of white space or of separators, as spreadsheets write them, is as empty as an empty one.
+            if !record.iter().all(str::is_empty) {
                 rows.check_fields(&record)?;
                 rows.records.push(record);
             }
@@ -109,13 +118,18 @@ impl<'a> CsvRows<'a> {
     /// A number of a row.
     pub(super) fn number(&self, record: &StringRecord, column: usize, range: Of) -> Result<f64, InputError> {
         let (name, found) = (self.header[column].to_owned(), record[column].to_owned());
-        let problem = match found.parse::<f64>() {
+        let problem = match self.parse(&found) {
             Ok(number) if range.contains(number) => return Ok(number),
             Ok(_) => Problem::Number { field: name, found, expected: range.words() },
             Err(_) if found.is_empty() => Problem::EmptyField { column: name },
-            Err(_) => Problem::NotANumber { column: name, found },
+            Err(_) => Problem::NotANumber { column: name, found: short(&found, SHOWN) },
         };
         Err(self.refuse_field(record, column, problem))
+    }
+
+    /// A number with a point; where fields are not parted by commas also one with a decimal comma.
+    fn parse(&self, field: &str) -> Result<f64, ParseFloatError> {
+        if self.separator != ',' && !field.contains('.') { field.replacen(',', ".", 1).parse() } else { field.parse() }
     }
 
     /// Line of a row, from 1.
@@ -137,16 +151,15 @@ impl<'a> CsvRows<'a> {
     }
 
     fn check_header(&self) -> Result<(), InputError> {
-        for (i, name) in self.header.iter().enumerate() {
-            if self.header.iter().take(i).any(|other| other == name) {
-                return Err(self.refuse_header(Problem::Duplicate { what: "column", name: name.to_owned() }));
-            }
+        let mut names = HashSet::new();
+        if let Some(name) = self.header.iter().find(|name| !names.insert(*name)) {
+            return Err(self.refuse_header(Problem::Duplicate { what: "column", name: short(name, SHOWN) }));
         }
         self.check_joint_columns().map_err(|problem| self.refuse_header(problem))?;
         let others = [self.expected.required, self.expected.optional].concat();
         let is_known = |name: &str| others.contains(&name) || self.joint_columns().any(|joint| joint == name);
         if let Some(name) = self.header.iter().find(|name| !is_known(name)) {
-            let problem = Problem::UnknownColumn { name: name.to_owned(), expected: self.expected.header };
+            let problem = Problem::UnknownColumn { name: short(name, SHOWN), expected: self.expected.header };
             return Err(self.refuse_header(problem));
         }
         Ok(())
@@ -183,7 +196,8 @@ impl<'a> CsvRows<'a> {
         if record.iter().any(|field| field.contains('\n')) {
             return Err(self.refuse_row(record, Problem::OpenQuote));
         }
-        if record.len() != self.header.len() {
+        // Spreadsheets write empty fields behind the last column.
+        if record.len() < self.header.len() || record.iter().skip(self.header.len()).any(|field| !field.is_empty()) {
             return Err(self.refuse_row(record, Problem::FieldCount { found: record.len(), expected: self.header.len() }));
         }
         Ok(())
@@ -199,7 +213,7 @@ impl<'a> CsvRows<'a> {
     ) -> Result<usize, InputError> {
         index.ok_or_else(|| {
             let known = points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>().join(", ");
-            self.refuse_field(record, column, Problem::UnknownEnd { what, found: record[column].to_owned(), known })
+            self.refuse_field(record, column, Problem::UnknownEnd { what, found: short(&record[column], SHOWN), known })
         })
     }
 
@@ -218,18 +232,32 @@ impl<'a> CsvRows<'a> {
         }
     }
 
-    /// The bytes of one field; of the whole line where quotes hide the commas.
+    /// The bytes of one field; of the whole line where quotes hide the separators.
     fn field_span(&self, record: &StringRecord, column: usize) -> Range<usize> {
         let line_span = self.locate(record).1;
         let line = &self.source.text()[line_span.clone()];
         if line.contains('"') {
             return line_span;
         }
-        let start = line_span.start + line.split(',').take(column).map(|field| field.len() + 1).sum::<usize>();
-        let field = line.split(',').nth(column).unwrap_or_default();
+        let start = line_span.start + line.split(self.separator).take(column).map(|field| field.len() + 1).sum::<usize>();
+        let field = line.split(self.separator).nth(column).unwrap_or_default();
         let lead = field.len() - field.trim_start().len();
         start + lead..start + lead + field.trim().len().max(1)
     }
+}
+
+/// What parts the fields of the header: of a comma, a semicolon and a tab the first that it has.
+fn separator(text: &str) -> char {
+    let header = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or_default();
+    [',', ';', '\t'].into_iter().find(|&separator| header.contains(separator)).unwrap_or(',')
+}
+
+/// A header without the columns at its end that have no name.
+fn without_empty_end(header: &StringRecord) -> StringRecord {
+    let named = header.iter().enumerate().filter(|(_, name)| !name.is_empty()).last().map_or(0, |(last, _)| last + 1);
+    let mut kept = header.clone();
+    kept.truncate(named);
+    kept
 }
 
 /// Number (from 1) and unit of a joint's column.

@@ -2,13 +2,37 @@
 
 use thiserror::Error;
 
+use crate::text::one_line;
+
 /// What is wrong. Each variant knows what was found and what was expected.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The file cannot be opened, or is not UTF-8 text.
+    /// The file cannot be opened or read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
+    /// Bytes that are no text.
+    #[error("this is no {encoding} text")]
+    NotText {
+        /// The encoding that was expected.
+        encoding: &'static str,
+    },
+    /// A text with a byte that no text has.
+    #[error("a zero byte, which no text has")]
+    ZeroByte,
+    /// An XML document in an encoding that nobody knows.
+    #[error("unknown encoding `{0}`")]
+    Encoding(String),
+    /// More of something than any file has.
+    #[error("{found} {what}, expected at most {most}")]
+    TooMany {
+        /// `chucks`, `spheres`, `bar lengths`.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// Neither a file nor a built-in has this name.
     #[error("no such file, and no built-in {what} of this name")]
     NoSuchFile {
@@ -266,11 +290,18 @@ impl Problem {
             Self::Unreadable(_) | Self::Csv(_) | Self::Number { .. } | Self::VectorLength { .. } | Self::EmptyField { .. } => {
                 return None;
             }
-            Self::FieldCount { .. } => "Is there a decimal comma? Numbers are written with a point, fields are parted by commas.",
+            Self::NotText { encoding: "UTF-8" } => {
+                "Save it as UTF-8: in a spreadsheet \"CSV UTF-8\", in an editor \"Save with encoding\". Or: iconv -f WINDOWS-1252 -t UTF-8"
+            }
+            Self::NotText { .. } => "The file is damaged, or in another encoding than it says. Save it as UTF-8.",
+            Self::ZeroByte => "Is it UTF-16 without a byte order mark, or no text at all? Save it as UTF-8.",
+            Self::Encoding(_) => "Save it as UTF-8, and say encoding=\"UTF-8\" in the first line.",
+            Self::TooMany { .. } => "Rigs have far fewer; is it the right file?",
+            Self::FieldCount { .. } => "Is there a decimal comma? Write numbers with a point, or part the fields by semicolons.",
             Self::OpenQuote => "Close the quote, or write the field without quotes.",
             Self::NoBarLength => "lengths_mm holds the bar's length at mid travel, one for each extension.",
             Self::JointColumns { found: 0, header, .. } => {
-                return Some(format!("The first line must be the header, parted by commas: {header}."));
+                return Some(format!("The first line must be the header, parted by commas, semicolons or tabs: {header}."));
             }
             Self::RobotName { .. } => "Screens and files of others show the name: write a short one, on one line.",
             Self::Toml(_) => "The keys and their units are in docs/files.md.",
@@ -312,9 +343,10 @@ impl Problem {
     }
 }
 
-/// At most so many characters of a text, with spaces for what a terminal would obey.
+/// At most so many characters of a text, on one line.
 pub(super) fn short(text: &str, most: usize) -> String {
-    let mut shown: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(most).collect();
+    let text = one_line(text);
+    let mut shown: String = text.chars().take(most).collect();
     if text.chars().nth(most).is_some() {
         shown.push('…');
     }

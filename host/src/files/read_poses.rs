@@ -22,7 +22,7 @@ impl Dataset {
     pub fn read<'a>(paths: impl IntoIterator<Item = &'a Path>, robot: &Robot, rig: &Rig) -> Result<Self, InputError> {
         let mut dataset = Self::default();
         for path in paths {
-            dataset.append(&Source::read(path)?, robot, rig)?;
+            dataset.append(&Source::read_rows(path)?, robot, rig)?;
         }
         Ok(dataset)
     }

@@ -136,6 +136,7 @@ fn points(source: &Source, what: &'static str, points: &[PointToml]) -> Result<V
     if points.is_empty() {
         return Err(InputError::of_file(source.name(), Problem::Empty(what)));
     }
+    check_count(source, if what == "chuck" { "chucks" } else { "spheres" }, points.len())?;
     let mut named: Vec<NamedPoint> = Vec::new();
     for point in points {
         let name = point.name.as_ref();
@@ -152,7 +153,14 @@ fn points(source: &Source, what: &'static str, points: &[PointToml]) -> Result<V
     Ok(named)
 }
 
+/// Every chuck is paired with every sphere, and every length with both: what is searched and told grows with their product.
+fn check_count(source: &Source, what: &'static str, found: usize) -> Result<(), InputError> {
+    const MOST: usize = 100;
+    if found <= MOST { Ok(()) } else { Err(InputError::of_file(source.name(), Problem::TooMany { what, found, most: MOST })) }
+}
+
 fn read_bar(source: &Source, bar: &BarToml) -> Result<Bar, InputError> {
+    check_count(source, "bar lengths", bar.lengths_mm.as_ref().len())?;
     if bar.lengths_mm.as_ref().is_empty() {
         return Err(InputError::at(source, bar.lengths_mm.span(), Problem::NoBarLength));
     }

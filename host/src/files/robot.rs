@@ -16,6 +16,7 @@ use super::builtin::ROBOTS;
 use super::numbers::{Range as Of, deserialize, in_range, vector};
 use super::problem::{Problem, short};
 use super::source::{InputError, Source};
+use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, tidy};
 
 /// A robot's name is not longer: it goes to screens and into the files of others.
@@ -216,7 +217,7 @@ impl Robot {
         let chain = Chain::new(&kinds, &parameters).map_err(|error| of_file(Problem::Toml(error.to_string())))?;
         let name = match &file.name {
             Some(name) => robot_name(source, name)?,
-            None => source.name().to_owned(),
+            None => one_line(source.name()).into_owned(),
         };
         Ok(Self { name, chain, limits, encoders, calibration: file.calibration, source: source.clone() })
     }

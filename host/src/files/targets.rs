@@ -28,9 +28,6 @@ pub enum Goal {
     Pose(Pose<f64>, Option<JointVector<f64>>),
 }
 
-/// Longer files of targets are not read: a million rows fit in.
-pub const MOST_TARGET_BYTES: u64 = 128 << 20;
-
 const POSE: [&str; 6] = ["x_mm", "y_mm", "z_mm", "alpha_deg", "beta_deg", "gamma_deg"];
 const MM_DECIMALS: usize = 6;
 /// A turn of a nanodegree moves what is a metre away by less than a nanometre.

@@ -1,5 +1,6 @@
 //! Writing a file so that no reader ever sees half of it.
 
+use std::collections::HashSet;
 use std::fs::{File, Permissions};
 use std::io::{Error, ErrorKind, Result as IoResult, Write};
 use std::path::{Path, PathBuf};
@@ -8,24 +9,75 @@ use miette::Diagnostic;
 use tempfile::NamedTempFile;
 use thiserror::Error;
 
+use super::kind::FileKind;
+use super::protect::{self, Refusal};
 use crate::platform;
 
 /// A file could not be written; what stood there before still stands there.
 #[derive(Debug, Error, Diagnostic)]
-#[error("{}: cannot be written: {error}", path.display())]
-pub struct WriteError {
-    path: PathBuf,
-    error: Error,
-    #[help]
-    help: String,
+pub enum WriteError {
+    /// The operating system says no, or whoever makes the contents.
+    #[error("{}: cannot be written: {error}", path.display())]
+    #[diagnostic(help("{help}"))]
+    Failed {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        error: Error,
+        /// What became of it.
+        help: String,
+    },
+    /// What stands there is not to be replaced.
+    #[error("{}: {refusal}", path.display())]
+    #[diagnostic(help("{}", refusal.help()))]
+    Refused {
+        /// The file.
+        path: PathBuf,
+        /// What stands there.
+        refusal: Refusal,
+    },
 }
 
-/// Writes `contents` beside `path` under a temporary name, flushes it to the disk and renames it onto `path`. A link is
+/// A file that a command was asked to write. It takes the place of no input of this process, no recording and no file of a session, and
+/// of another kind of file only with `force`: it is checked when it is begun, and again when it is put in place.
+#[derive(Clone, Copy, Debug)]
+pub struct Output<'a> {
+    /// The name that was given.
+    pub path: &'a Path,
+    /// What is written.
+    pub kind: FileKind,
+    /// Whether a file of another kind may be replaced.
+    pub force: bool,
+}
+
+impl Output<'_> {
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// [`WriteError`]; an older file of that name is left as it was.
+    pub fn write(&self, contents: &str) -> Result<(), WriteError> {
+        let mut file = PendingFile::begin(*self)?;
+        file.fill(contents)?;
+        commit_all([file])
+    }
+
+    /// Whether the file could be written: to be asked before a long computation of what it is to hold, and after all that it needs was
+    /// read.
+    ///
+    /// # Errors
+    /// As [`Output::write`].
+    pub fn check(&self) -> Result<(), WriteError> {
+        PendingFile::begin(*self).map(|_| ())
+    }
+}
+
+/// Writes a file that this program keeps for itself, such as those of the session that it records: what a command was asked to write is
+/// an [`Output`]. `contents` go beside `path` under a temporary name, are flushed to the disk and renamed onto `path`. A link is
 /// followed, and an older file's permissions are kept. A device, pipe or folder is refused, since renaming would replace it, and so are
 /// a read-only file and a link to nothing.
 ///
 /// # Errors
-/// [`WriteError`] with the operating system's reason; an older file of that name is left as it was.
+/// [`WriteError::Failed`] with the operating system's reason; an older file of that name is left as it was.
 pub fn write_atomically(path: &Path, contents: &str) -> Result<(), WriteError> {
     write_atomically_with(path, |file| file.write_all(contents.as_bytes()))
 }
@@ -35,23 +87,20 @@ pub fn write_atomically(path: &Path, contents: &str) -> Result<(), WriteError> {
 /// # Errors
 /// As [`write_atomically`].
 pub fn write_atomically_with(path: &Path, write: impl FnOnce(&mut File) -> IoResult<()>) -> Result<(), WriteError> {
-    let mut file = PendingFile::begin(path)?;
+    let mut file = PendingFile::begin_own(path)?;
     write(file.file_mut()).map_err(|error| WriteError::new(path, error))?;
     commit_all([file])
-}
-
-/// Whether a file could be written: to be asked before a long computation of what it is to hold.
-///
-/// # Errors
-/// As [`write_atomically`].
-pub fn check_writable(path: &Path) -> Result<(), WriteError> {
-    PendingFile::begin(path).map(|_| ())
 }
 
 impl WriteError {
     /// What keeps a file from being written, or an error of whoever makes its contents. Nothing was changed.
     pub(crate) fn new(path: &Path, error: Error) -> Self {
         Self::after(&[], path, error)
+    }
+
+    /// Whether it is not the system that says no, but what stands there.
+    pub fn is_refusal(&self) -> bool {
+        matches!(self, Self::Refused { .. })
     }
 
     /// As [`WriteError::new`], when these files have been replaced already.
@@ -65,7 +114,7 @@ impl WriteError {
         } else {
             format!("Written before, and whole: {}.", names.join(", "))
         };
-        Self { path: path.to_owned(), error, help }
+        Self::Failed { path: path.to_owned(), error, help }
     }
 }
 
@@ -74,25 +123,62 @@ pub(crate) struct PendingFile {
     file: NamedTempFile,
     path: PathBuf,
     target: Target,
+    /// What is checked before it is put in place; nothing for the program's own files.
+    rule: Option<Rule>,
+}
+
+/// What is written, and whether a file of another kind may be replaced.
+#[derive(Clone, Copy)]
+struct Rule {
+    kind: FileKind,
+    force: bool,
 }
 
 impl PendingFile {
-    /// Begins a file.
+    /// Begins a file that a command was asked to write.
     ///
     /// # Errors
-    /// As [`write_atomically`].
-    pub(crate) fn begin(path: &Path) -> Result<Self, WriteError> {
-        let begin = || {
-            let target = Target::of(path)?;
-            Ok((target.temporary()?, target))
+    /// As [`Output::write`].
+    pub(crate) fn begin(output: Output<'_>) -> Result<Self, WriteError> {
+        Self::begin_by(output.path, Some(Rule { kind: output.kind, force: output.force }))
+    }
+
+    /// Begins the files of a command that writes several.
+    ///
+    /// # Errors
+    /// As [`Output::write`]; also when two of them are one file.
+    pub(crate) fn begin_all<'a>(outputs: impl IntoIterator<Item = Output<'a>>) -> Result<Vec<Self>, WriteError> {
+        let mut places = HashSet::new();
+        let begun = |output: Output<'a>| {
+            let file = Self::begin(output)?;
+            let refused = || WriteError::Refused { path: output.path.to_owned(), refusal: Refusal::Twice };
+            if places.insert(file.target.place()) { Ok(file) } else { Err(refused()) }
         };
-        let (file, target) = begin().map_err(|error| WriteError::new(path, error))?;
-        Ok(Self { file, path: path.to_owned(), target })
+        outputs.into_iter().map(begun).collect()
+    }
+
+    fn begin_own(path: &Path) -> Result<Self, WriteError> {
+        Self::begin_by(path, None)
+    }
+
+    fn begin_by(path: &Path, rule: Option<Rule>) -> Result<Self, WriteError> {
+        let target = Target::of(path).map_err(|error| WriteError::new(path, error))?;
+        target.check(path, rule)?;
+        let file = target.temporary().map_err(|error| WriteError::new(path, error))?;
+        Ok(Self { file, path: path.to_owned(), target, rule })
     }
 
     /// Where to write.
     pub(crate) fn file_mut(&mut self) -> &mut File {
         self.file.as_file_mut()
+    }
+
+    /// Writes all that it is to hold.
+    ///
+    /// # Errors
+    /// [`WriteError::Failed`].
+    pub(crate) fn fill(&mut self, contents: &str) -> Result<(), WriteError> {
+        self.file.write_all(contents.as_bytes()).map_err(|error| WriteError::new(&self.path, error))
     }
 }
 
@@ -137,9 +223,24 @@ impl Target {
         Ok(Self { path: path.to_owned(), permissions: None })
     }
 
+    fn check(&self, path: &Path, rule: Option<Rule>) -> Result<(), WriteError> {
+        let Some(Rule { kind, force }) = rule else { return Ok(()) };
+        protect::check(path, &self.path, kind, force).map_err(|refusal| WriteError::Refused { path: path.to_owned(), refusal })
+    }
+
+    /// The folder, links followed, and the name: the same for two names of one file, there already or not.
+    fn place(&self) -> PathBuf {
+        let folder = self.folder().canonicalize().unwrap_or_else(|_| self.folder().to_owned());
+        self.path.file_name().map_or_else(|| folder.clone(), |name| folder.join(name))
+    }
+
+    fn folder(&self) -> &Path {
+        self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    }
+
     /// The file to write before: in the same folder, so that it can be renamed.
     fn temporary(&self) -> IoResult<NamedTempFile> {
-        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = self.folder();
         let mut builder = tempfile::Builder::new();
         builder.prefix(".host-cal-");
         let Some(permissions) = &self.permissions else {
@@ -155,14 +256,19 @@ impl Target {
 /// Flushes files to the disk, and renames them when that has worked for all.
 ///
 /// # Errors
-/// As [`write_atomically`]. Where one of several cannot be renamed, [`WriteError`] names those before it, which have been.
+/// As [`Output::write`]. Where one of several cannot be renamed, [`WriteError`] names those before it, which have been.
+#[expect(clippy::disallowed_methods, reason = "the one place where files are put in place")]
 pub(crate) fn commit_all(files: impl IntoIterator<Item = PendingFile>) -> Result<(), WriteError> {
     let files: Vec<PendingFile> = files.into_iter().collect();
-    for PendingFile { file, path, .. } in &files {
+    for PendingFile { file, path, target, rule } in &files {
+        // Again, for what was read, or came there, since it was begun.
+        target.check(path, *rule)?;
         file.as_file().sync_all().map_err(|error| WriteError::new(path, error))?;
     }
     let mut replaced = Vec::new();
-    for PendingFile { file, path, target } in files {
+    for PendingFile { file, path, target, rule } in files {
+        // And again: on some disks two names of other letter case are one file.
+        target.check(&path, rule)?;
         file.persist(&target.path).map_err(|error| WriteError::after(&replaced, &path, error.error))?;
         replaced.push(path);
     }
@@ -178,7 +284,7 @@ mod tests {
         let folder = tempfile::TempDir::new().unwrap();
         let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
         std::fs::write(&first, "older").unwrap();
-        let mut files = [&first, &second].map(|path| PendingFile::begin(path).unwrap());
+        let mut files = [&first, &second].map(|path| PendingFile::begin_own(path).unwrap());
         files.iter_mut().for_each(|file| file.file_mut().write_all(b"newer").unwrap());
         std::fs::create_dir(&second).unwrap();
         let error = commit_all(files).unwrap_err();

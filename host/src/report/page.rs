@@ -9,6 +9,7 @@ use super::figures::{CHUCKS, Figure, dark_rules, drawn, hex, wires_m};
 use super::proof::Proof;
 use super::tables::{largest, parameters};
 use super::verdict::{Answer, Verdict};
+use crate::text::visible;
 use crate::units::{fixed, mm_from_m};
 
 const STYLE: &str = include_str!("page.css");
@@ -40,7 +41,7 @@ pub fn html(facts: &Facts, figures: &[Figure], when: &str) -> String {
             }
         }
     };
-    page.into_string()
+    visible(&page.into_string()).into_owned()
 }
 
 fn first_screen(facts: &Facts, when: &str) -> Markup {

@@ -22,6 +22,10 @@ pub use pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 pub use recorder::{Connection, MeasuredPose, RecordError, Recorder};
 pub use summary::LogSummary;
 
+/// Names of the files in a session: no command writes anything else under them.
+pub(crate) const FILE_NAMES: [&str; 6] = [LOG_NAME, DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME];
+/// Folder of a session for programs of the robot's controller.
+pub const PROGRAMS_NAME: &str = "programs";
 /// Name of the log in a session.
 pub const LOG_NAME: &str = "stream.bbl";
 /// Name of the description in a session.

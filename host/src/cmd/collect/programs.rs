@@ -4,14 +4,12 @@ use std::path::Path;
 
 use super::session_files::SessionFiles;
 use crate::cmd::outcome::CommandError;
-use crate::cmd::report::write_file;
+use crate::cmd::report::write_session_file;
 use crate::collect::{ShellPrograms, shells};
 use crate::files::{PlanRow, RowKind};
 use crate::robot_link::JointSpeed;
 use crate::robot_link::program::{Dialect, Program, ProgramStep, write_program};
-
-/// Folder in a session.
-const FOLDER: &str = "programs";
+use crate::session::PROGRAMS_NAME;
 
 /// Writes the programs of all shells into the session; their names, in the order of the plan.
 pub(super) fn write_programs(
@@ -40,11 +38,11 @@ pub(super) fn write_programs(
         written.extend(approach_files.into_iter().chain(measure_files));
         names.push(ShellPrograms { approach, measure });
     }
-    let folder = session.join(FOLDER);
+    let folder = session.join(PROGRAMS_NAME);
     std::fs::create_dir_all(&folder)
         .map_err(|error| CommandError::output(super::FolderError { folder: folder.clone(), error }))?;
     for (name, text) in &written {
-        write_file(&folder.join(name), text)?;
+        write_session_file(&folder.join(name), text)?;
     }
     Ok(names)
 }

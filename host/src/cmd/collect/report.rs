@@ -9,6 +9,7 @@ use super::session_files::SessionFiles;
 use crate::board::StreamLosses;
 use crate::cmd::report::Report;
 use crate::collect::{CollectError, Ended, Lag, Ledger, RowState, Summary};
+use crate::text::one_line;
 use crate::units::mm_from_m;
 
 #[derive(Serialize)]
@@ -105,7 +106,11 @@ impl Report for CollectReport {
     fn text(&self) -> String {
         let mut text = format!(
             "{}: {} of {} planned poses are measured, {} poses written in this run ({:.0} s)\n",
-            self.session, self.measured, self.planned, self.poses_written, self.duration_s
+            one_line(&self.session),
+            self.measured,
+            self.planned,
+            self.poses_written,
+            self.duration_s
         );
         let numbers = [(self.skipped, "skipped"), (self.missed.len(), "missed"), (self.left, "left")];
         let others: Vec<String> =
@@ -114,7 +119,7 @@ impl Report for CollectReport {
             text += &format!("{}\n", others.join(", "));
         }
         for missed in &self.missed {
-            text += &format!("  line {}: {}\n", missed.line, missed.why);
+            text += &format!("  line {}: {}\n", missed.line, one_line(&missed.why));
         }
         if let Some(repeatability_mm) = self.repeatability_mm {
             text += &format!("{} poses returned to: lengths differ by {repeatability_mm:.4} mm RMS\n", self.repeats.len());
@@ -123,7 +128,7 @@ impl Report for CollectReport {
             text += &format!("the LVDT comes {lag_ms:.3} ± {std_ms:.3} ms late; removed from the lengths\n");
         }
         for trouble in &self.troubles {
-            text += &format!("trouble: {trouble}\n");
+            text += &format!("trouble: {}\n", one_line(trouble));
         }
         text += &match self.losses.missing + self.losses.overruns {
             0 => "nothing lost\n".to_owned(),
@@ -132,7 +137,7 @@ impl Report for CollectReport {
         if self.left + self.missed.len() > 0 {
             text += "The same command goes on.\n";
         } else {
-            text += &format!("Next: host-cal fit {} --out calibrated.toml\n", self.session);
+            text += &format!("Next: host-cal fit {} --out calibrated.toml\n", one_line(&self.session));
         }
         text
     }

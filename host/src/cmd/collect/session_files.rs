@@ -6,7 +6,7 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use crate::cmd::outcome::CommandError;
-use crate::cmd::report::write_file;
+use crate::cmd::report::write_session_file;
 use crate::files::{PlanRow, RIGS, ROBOTS, Rig, Robot, Source, read_plan};
 use crate::session::{PLAN_NAME, RIG_NAME, ROBOT_NAME};
 
@@ -56,7 +56,7 @@ impl SessionFiles {
                 let failed = |error| CommandError::output(SessionFileError::Directory { path: folder.to_owned(), error });
                 std::fs::create_dir_all(folder).map_err(failed)?;
             }
-            write_file(path, source.text())?;
+            write_session_file(path, source.text())?;
         }
         Ok(())
     }
@@ -74,11 +74,11 @@ fn choose(
     let what = name.trim_end_matches(".toml");
     let kept_path = session.join(name);
     let read = |given| match builtins {
-        [] => Source::read(Path::new(given)),
+        [] => Source::read_rows(Path::new(given)),
         _ => Source::named_or_read(given, builtins, what),
     };
     let given_source = given.map(read).transpose()?;
-    let kept = if kept_path.is_file() { Some(Source::read(&kept_path)?) } else { None };
+    let kept = if kept_path.is_file() { Some(Source::read_rows(&kept_path)?) } else { None };
     match (given_source, kept) {
         (Some(given_source), Some(kept)) if given_source.text() != kept.text() => {
             let given = given.unwrap_or_default().to_owned();

@@ -7,15 +7,17 @@ mod terminal;
 #[cfg(test)]
 mod tests;
 
-use std::io::{IsTerminal, Write, stderr, stdin};
+use std::io::{IsTerminal, stdin};
 use std::time::{Duration, Instant};
 
 pub(super) use picture::{Bar, Joint, Picture, Poses};
 use terminal::Terminal;
 pub(super) use terminal::give_back;
 
+use super::out::{is_seen, tell};
 use super::port::EndRequest;
 pub(super) use crate::platform::Key;
+use crate::text::one_line;
 
 /// The steady screen, or lines on stderr.
 pub(super) struct Screen {
@@ -36,7 +38,7 @@ impl Screen {
     /// A steady screen needs a terminal at both ends: one to draw on and one to take keys from.
     pub(super) fn open(end: &EndRequest) -> Self {
         let is_dumb = std::env::var_os("TERM").is_some_and(|name| name == "dumb");
-        let is_terminal = stderr().is_terminal() && stdin().is_terminal() && !is_dumb;
+        let is_terminal = is_seen() && stdin().is_terminal() && !is_dumb;
         // A terminal that cannot be taken still shows lines.
         let terminal = is_terminal.then(|| Terminal::take(end.clone())).and_then(Result::ok);
         Self { terminal, notes: Vec::new(), shown: Instant::now() }
@@ -65,7 +67,7 @@ impl Screen {
             && self.shown.elapsed() >= REDRAW
         {
             self.shown = Instant::now();
-            terminal.draw(&picture(), &self.notes);
+            terminal.draw(&picture().made_visible(), &self.notes);
         }
     }
 
@@ -73,17 +75,16 @@ impl Screen {
     pub(super) fn say(&mut self, line: impl FnOnce() -> String) {
         if self.terminal.is_none() && self.shown.elapsed() >= SAY {
             self.shown = Instant::now();
-            say(&line());
+            tell(&line());
         }
     }
 
-    /// Says something that stays. What a board or a controller said moves no cursor.
+    /// Says something that stays.
     pub(super) fn note(&mut self, text: &str) {
-        let lines = text.lines().map(|line| line.replace(char::is_control, ""));
         if self.terminal.is_none() {
-            return lines.for_each(|line| say(&line));
+            return text.lines().for_each(tell);
         }
-        self.notes.extend(lines);
+        self.notes.extend(text.lines().map(|line| one_line(line).into_owned()));
         let surplus = self.notes.len().saturating_sub(KEPT_NOTES);
         self.notes.drain(..surplus);
     }
@@ -92,7 +93,7 @@ impl Screen {
     pub(super) fn close(&mut self) {
         if self.terminal.take().is_some() {
             let first = self.notes.len().saturating_sub(LAST_NOTES);
-            self.notes.drain(..).skip(first).for_each(|note| say(&note));
+            self.notes.drain(..).skip(first).for_each(|note| tell(&note));
         }
     }
 }
@@ -101,8 +102,4 @@ impl Drop for Screen {
     fn drop(&mut self) {
         self.close();
     }
-}
-
-fn say(text: &str) {
-    let _ = writeln!(stderr(), "{text}");
 }

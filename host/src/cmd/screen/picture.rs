@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use ballbar::{JointKind, Stillness};
 
+use crate::text::one_line;
 use crate::units::ScreenUnit;
 
 /// How a run stands.
@@ -67,6 +68,15 @@ pub(in crate::cmd) struct Poses {
     /// As many as are wanted, when that is known.
     pub(in crate::cmd) of: Option<u64>,
     pub(in crate::cmd) left: Option<Duration>,
+}
+
+impl Picture {
+    /// With texts that move no cursor, wherever they come from.
+    pub(super) fn made_visible(self) -> Self {
+        let shown = |text: String| one_line(&text).into_owned();
+        let bar = Bar { name: self.bar.name.map(shown), ..self.bar };
+        Self { head: self.head.into_iter().map(shown).collect(), bar, next: shown(self.next), ..self }
+    }
 }
 
 impl Joint {

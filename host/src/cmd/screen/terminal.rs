@@ -1,7 +1,7 @@
 //! The terminal while a steady screen has it, and how it is given back.
 
 use std::collections::VecDeque;
-use std::io::{Write, stderr};
+use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, Once, TryLockError};
@@ -15,6 +15,7 @@ use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, d
 
 use super::layout;
 use super::picture::Picture;
+use crate::cmd::out::terminal;
 use crate::cmd::port::EndRequest;
 use crate::platform::{Key, Keyboard};
 
@@ -40,7 +41,7 @@ impl Terminal {
         give_back_on_panic();
         *lock() = true;
         let terminal = enable_raw_mode()
-            .and_then(|()| execute!(stderr(), EnterAlternateScreen))
+            .and_then(|()| execute!(terminal(), EnterAlternateScreen))
             .and_then(|()| ratatui::Terminal::new(CrosstermBackend::new(Frames::default())))
             .inspect_err(|_| give_back())?;
         let (sender, pressed) = channel();
@@ -95,7 +96,7 @@ pub(in crate::cmd) fn give_back() {
     if is_taken.as_mut().is_none_or(|is_taken| std::mem::take(&mut **is_taken)) {
         // Whatever fails here cannot be told anywhere.
         let _ = disable_raw_mode();
-        let _ = execute!(stderr(), LeaveAlternateScreen, Show);
+        let _ = execute!(terminal(), LeaveAlternateScreen, Show);
     }
 }
 
@@ -143,7 +144,7 @@ impl Write for Frames {
     fn flush(&mut self) -> std::io::Result<()> {
         let is_taken = lock();
         if *is_taken {
-            let _ = stderr().write_all(&self.0);
+            let _ = terminal().write_all(&self.0);
         }
         self.0.clear();
         Ok(())

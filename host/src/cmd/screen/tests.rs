@@ -105,3 +105,17 @@ fn what_would_move_the_cursor_is_not_drawn() {
     let shown = text(&collecting(), &notes, (100, 24));
     assert!(!shown.contains(['\u{1b}', '\u{7}', '\u{8}', '\r']), "{shown:?}");
 }
+
+#[test]
+fn what_boards_and_controllers_are_called_moves_no_cursor() {
+    let hostile = "\u{1b}]0;pwned\u{7}\u{9b}2J\u{202e}a\nb\r\u{2028}\u{200b}";
+    let picture = Picture {
+        head: vec![hostile.into()],
+        bar: Bar { name: Some(hostile.into()), ..collecting().bar },
+        next: hostile.into(),
+        ..collecting()
+    };
+    let shown = text(&picture.made_visible(), &[], (100, 24));
+    assert_eq!(shown.chars().find(|&c| c != '\n' && crate::text::is_hidden(c)), None, "{shown}");
+    assert_eq!(shown.matches("\\u{1b}]0;pwned\\u{7}\\u{9b}2J\\u{202e}a\\nb\\r\\u{2028}\\u{200b}").count(), 3, "{shown}");
+}

@@ -11,6 +11,7 @@ use super::Imported;
 use super::elements::{EncoderModel, Limits, Motion, UrdfRobot};
 use super::tree::Path;
 use crate::kinematics::{compose, from_link, link_angles};
+use crate::text::one_line;
 use crate::units::{ScreenUnit, mm_from_m, without_noise};
 
 /// What is known of a joint once it turns about z.
@@ -32,17 +33,16 @@ pub(super) fn imported(source: &Source, urdf: &UrdfRobot<'_>, path: &Path<'_>) -
     let mut pending = from_link(Vector3::zeros(), [0.0; 3]);
     for joint in &path.joints {
         pending = compose(&pending, &joint.parent_from_child(source)?);
-        let Motion::Moves { kind, axis, limits } = joint.motion(source)? else { continue };
+        let motion = joint.motion(source)?;
+        remarks.extend(joint.remarks(source, &motion));
+        let Motion::Moves { kind, axis, limits } = motion else { continue };
         let turn = z_to(&axis);
         links.push(compose(&pending, &turn));
         pending = Pose { rotation: turn.rotation.transpose(), translation_m: Vector3::zeros() };
         let encoder = joint.encoder(source, kind)?.unwrap_or(EncoderModel { offset: 0.0, scale: 1.0 });
         let (a, b) = match limits {
             Limits::Between(lower, upper) => ((lower - encoder.offset) / encoder.scale, (upper - encoder.offset) / encoder.scale),
-            Limits::None => {
-                remarks.push(format!("joint `{}` has no limits: it was given a turn, -180 to 180 degrees", joint.name));
-                (-PI / encoder.scale.abs(), PI / encoder.scale.abs())
-            }
+            Limits::None | Limits::Zero => (-PI / encoder.scale.abs(), PI / encoder.scale.abs()),
         };
         joints.push(ZJoint { name: joint.name, kind, encoder, min: a.min(b), max: a.max(b) });
     }
@@ -68,8 +68,8 @@ fn z_to(axis: &Vector3<f64>) -> Pose<f64> {
 }
 
 fn toml(name: &str, path: &Path<'_>, links: &[Pose<f64>], joints: &[ZJoint<'_>]) -> String {
-    let mut text =
-        format!("# From a URDF, link `{}` to link `{}`.\nname = {}\n", path.base, path.tip, toml_edit::Value::from(name));
+    let ends = format!("link `{}` to link `{}`", path.base, path.tip);
+    let mut text = format!("# From a URDF, {}.\nname = {}\n", one_line(&ends), toml_edit::Value::from(name));
     for (i, link) in links.iter().enumerate() {
         let [x, y, z] = link.translation_m.map(|m| without_noise(mm_from_m(m))).into();
         let [alpha, beta, gamma] = link_angles(&link.rotation).map(|angle| without_noise(angle.to_degrees()));
@@ -83,7 +83,10 @@ fn toml(name: &str, path: &Path<'_>, links: &[Pose<f64>], joints: &[ZJoint<'_>])
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
         };
-        text += &format!("\n# {}\n[[joints]]\ntype = \"{kind}\"\noffset_{unit} = {offset:?}\nscale = {scale:?}\n", joint.name);
+        text += &format!(
+            "\n# {}\n[[joints]]\ntype = \"{kind}\"\noffset_{unit} = {offset:?}\nscale = {scale:?}\n",
+            one_line(joint.name)
+        );
         text += &format!("min_{unit} = {min:?}\nmax_{unit} = {max:?}\n");
     }
     text

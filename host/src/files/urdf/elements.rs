@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use ballbar::{JointKind, Pose, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::{Document, Node};
 
 use super::super::numbers::Range as Of;
@@ -44,6 +45,8 @@ pub(super) enum Limits {
     Between(f64, f64),
     /// A continuous joint.
     None,
+    /// From 0 to 0, which is what URDF takes for limits that are not given.
+    Zero,
 }
 
 /// θ = offset + scale · q, radians or metres.
@@ -100,9 +103,55 @@ impl UrdfJoint<'_> {
     /// The child's frame in the parent's, the joint at zero.
     pub(super) fn parent_from_child(&self, source: &Source) -> Result<Pose<f64>, InputError> {
         let Some(origin) = self.child_element("origin") else { return Ok(from_link(Vector3::zeros(), [0.0; 3])) };
-        let translation_m = self.vector(source, origin, "xyz", mm_from_m)?.unwrap_or_default();
-        let [roll, pitch, yaw] = self.vector(source, origin, "rpy", f64::to_degrees)?.unwrap_or_default();
-        Ok(from_link(translation_m.into(), [yaw, pitch, roll]))
+        let translation_m: Vector3<f64> = self.numbers(source, origin, "xyz", mm_from_m)?.unwrap_or_default().into();
+        let rpy = self.numbers(source, origin, "rpy", f64::to_degrees)?;
+        let Some(quaternion) = self.quaternion(source, origin)? else {
+            let [roll, pitch, yaw] = rpy.unwrap_or_default();
+            return Ok(from_link(translation_m, [yaw, pitch, roll]));
+        };
+        if rpy.is_some() {
+            let (what, found) = (self.what("origin"), "both rpy and quat_xyzw".to_owned());
+            return Err(refuse(source, origin, &what, found, "one of them"));
+        }
+        Ok(Pose { rotation: quaternion.to_rotation_matrix().into_inner(), translation_m })
+    }
+
+    /// The turn of URDF 1.1, which the readers of 1.0 pass over.
+    fn quaternion(&self, source: &Source, origin: Node<'_, '_>) -> Result<Option<UnitQuaternion<f64>>, InputError> {
+        const LEAST: f64 = 1e-6;
+        let Some([x, y, z, w]) = self.numbers(source, origin, "quat_xyzw", |value| value)? else { return Ok(None) };
+        let refused = || refuse(source, origin, &self.what("quat_xyzw"), "of no length".into(), "a unit quaternion");
+        UnitQuaternion::try_new(Quaternion::new(w, x, y, z), LEAST).ok_or_else(refused).map(Some)
+    }
+
+    /// What a user should know of a joint that moves: what of it has no place in a robot file, and what looks like a mistake.
+    pub(super) fn remarks(&self, source: &Source, motion: &Motion) -> Vec<String> {
+        /// A turn more than any joint in radians is likely to make either way, and a hundredth.
+        const MOST_RAD: f64 = 1.01 * std::f64::consts::TAU;
+        let place = |element: Node<'_, '_>| format!("{}:{}", source.name(), source.line_of(element.range().start));
+        let says = |element: Node<'_, '_>, what: String| format!("{}: joint `{}`: {what}", place(element), short(self.name));
+        let mut remarks = Vec::new();
+        if let Some(element) = self.child_element("calibration") {
+            let what = "<calibration> is not read: where the encoder meets its reference is not known here, and the joint's zero stays \
+                        where the origin has it";
+            remarks.push(says(element, what.to_owned()));
+        }
+        let Motion::Moves { kind, limits, .. } = motion else { return remarks };
+        let element = self.child_element("limit").unwrap_or(self.node);
+        remarks.extend(match limits {
+            Limits::None => Some(format!("joint `{}` has no limits: it was given a turn, -180 to 180 degrees", short(self.name))),
+            Limits::Zero => Some(says(element, "a <limit> from 0 to 0 is none: it was given a turn, -180 to 180 degrees".to_owned())),
+            &Limits::Between(lower, upper) if *kind == JointKind::Revolute && lower.abs().max(upper.abs()) > MOST_RAD => {
+                let [lower_deg, upper_deg] = [lower, upper].map(f64::to_degrees);
+                let what = format!(
+                    "<limit> is {lower} to {upper} radians, {lower_deg:.0} to {upper_deg:.0} degrees: was it written in degrees? URDF has \
+                     radians"
+                );
+                Some(says(element, what))
+            }
+            Limits::Between(..) => None,
+        });
+        remarks
     }
 
     pub(super) fn motion(&self, source: &Source) -> Result<Motion, InputError> {
@@ -133,7 +182,7 @@ impl UrdfJoint<'_> {
     fn axis(&self, source: &Source) -> Result<Vector3<f64>, InputError> {
         const LEAST: f64 = 1e-6;
         let Some(element) = self.child_element("axis") else { return Ok(Vector3::x()) };
-        let axis = self.vector(source, element, "xyz", mm_from_m)?.map_or_else(Vector3::x, Vector3::from);
+        let axis = self.numbers(source, element, "xyz", mm_from_m)?.map_or_else(Vector3::x, Vector3::from);
         let refused = || refuse(source, element, &self.what("axis"), "of no length".into(), "a direction");
         axis.try_normalize(LEAST).ok_or_else(refused)
     }
@@ -146,6 +195,9 @@ impl UrdfJoint<'_> {
         let upper = self.value(source, element, "upper", kind)?.unwrap_or(0.0);
         if lower < upper {
             return Ok(Limits::Between(lower, upper));
+        }
+        if (lower, upper) == (0.0, 0.0) && kind == JointKind::Revolute {
+            return Ok(Limits::Zero);
         }
         let found = format!("{lower} to {upper}");
         Err(refuse(source, element, &self.what("limit"), found, "a lower limit below the upper one"))
@@ -183,23 +235,23 @@ impl UrdfJoint<'_> {
         }
     }
 
-    /// Three numbers, each plausible as a file of ours has it.
-    fn vector(
+    /// Three numbers, or the four of a quaternion, each plausible as a file of ours has it.
+    fn numbers<const N: usize>(
         &self,
         source: &Source,
         node: Node<'_, '_>,
         name: &str,
         on_screen: fn(f64) -> f64,
-    ) -> Result<Option<[f64; 3]>, InputError> {
+    ) -> Result<Option<[f64; N]>, InputError> {
         let Some(text) = node.attribute(name) else { return Ok(None) };
-        let mut words = text.split_ascii_whitespace().map(str::parse::<f64>);
-        let numbers = (words.next(), words.next(), words.next(), words.next());
-        if let (Some(Ok(x)), Some(Ok(y)), Some(Ok(z)), None) = numbers
-            && [x, y, z].into_iter().all(|value| Of::Plausible.contains(on_screen(value)))
-        {
-            return Ok(Some([x, y, z]));
+        let words = text.split_ascii_whitespace().take(N + 1).map(str::parse::<f64>);
+        let numbers: Option<Vec<f64>> = words.collect::<Result<_, _>>().ok();
+        let numbers = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
+        if let Some(numbers) = numbers.filter(|numbers| numbers.iter().all(|&value| Of::Plausible.contains(on_screen(value)))) {
+            return Ok(Some(numbers));
         }
-        let expected = "three numbers, metres or radians, parted by spaces";
+        let expected =
+            if N == 4 { "four numbers, parted by spaces" } else { "three numbers, metres or radians, parted by spaces" };
         Err(refuse(source, node, &self.what(name), format!("`{}`", short(text)), expected))
     }
 }

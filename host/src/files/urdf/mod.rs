@@ -57,7 +57,7 @@ pub struct Imported {
 /// # Errors
 /// [`InputError`] naming the line and what is wrong there.
 pub fn read_urdf(path: &Path, ends: UrdfEnds<'_>) -> Result<Imported, InputError> {
-    parse_urdf(&Source::read_at_most(path, MOST_BYTES)?, ends)
+    parse_urdf(&Source::read_xml(path, MOST_BYTES)?, ends)
 }
 
 /// Takes the chain between two links from the text of a URDF.

@@ -12,6 +12,7 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 
 use super::FigureError;
+use crate::text::visible;
 use crate::units::fixed;
 
 pub(super) type Area<'b> = DrawingArea<SVGBackend<'b>, Shift>;
@@ -93,7 +94,7 @@ pub(super) fn draw(
         "<style>rect{{shape-rendering:crispEdges}}@media screen and (prefers-color-scheme:dark){{{}}}</style>",
         dark_rules()
     );
-    Ok(svg.replacen(">\n", &format!(">\n{style}\n"), 1))
+    Ok(visible(&svg).replacen(">\n", &format!(">\n{style}\n"), 1))
 }
 
 /// One axis of a chart.

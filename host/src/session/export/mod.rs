@@ -23,14 +23,10 @@ use thiserror::Error;
 
 use super::log::{LogError, LogReader};
 use super::summary::{LogSummary, Summing};
-use super::{DESCRIPTION_NAME, PLAN_NAME, POSES_NAME, RIG_NAME, ROBOT_NAME};
-use crate::files::{PendingFile, WriteError, commit_all};
+use crate::files::{FileKind, Output, PendingFile, WriteError, commit_all};
 use entry::{Entry, Writer};
 use shape::Shape;
 use teller::Teller;
-
-/// Files of a session beside its log.
-const SESSION_NAMES: [&str; 5] = [DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME];
 
 /// A format that a log can be exported to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +37,16 @@ pub enum LogFormat {
     Parquet,
     /// Samples, settled poses, tool poses and what happened, as timed messages.
     Mcap,
+}
+
+impl LogFormat {
+    fn kind(self) -> FileKind {
+        match self {
+            Self::Csv => FileKind::LogCsv,
+            Self::Parquet => FileKind::Parquet,
+            Self::Mcap => FileKind::Mcap,
+        }
+    }
 }
 
 /// Why a log could not be exported. No file was written or changed then, but those that [`WriteError`] names.
@@ -58,61 +64,26 @@ pub enum LogExportError {
     #[error("ended by Ctrl-C or a signal")]
     #[diagnostic(help("Nothing was written."))]
     Interrupted,
-    /// Two outputs in one file, or one that would take the place of a file of the session.
-    #[error("{}: is named twice, as an output and as {other}", path.display())]
-    #[diagnostic(help("Give every file a name of its own."))]
-    SameFile {
-        /// The file.
-        path: PathBuf,
-        /// What else it is to be.
-        other: &'static str,
-    },
 }
 
 /// Exports a log, or the log in a session's directory, until `is_ended`. Files are put in place when all have been written. Returns
-/// what was exported; settled poses and tool poses are in MCAP only.
+/// what was exported; settled poses and tool poses are in MCAP only. With `force` files of other kinds are replaced.
 ///
 /// # Errors
 /// [`LogExportError`].
-pub fn export_log(
+pub fn export_log<'a>(
     log: &Path,
-    outputs: &[(LogFormat, PathBuf)],
+    outputs: &'a [(LogFormat, PathBuf)],
+    force: bool,
     is_ended: &dyn Fn() -> bool,
 ) -> Result<LogSummary, LogExportError> {
     let mut reader = LogReader::open(log)?;
-    check_names(reader.path(), outputs)?;
-    let mut files: Vec<PendingFile> = outputs.iter().map(|(_, path)| PendingFile::begin(path)).collect::<Result<_, _>>()?;
+    let output = |(format, path): &'a (LogFormat, PathBuf)| Output { path, kind: format.kind(), force };
+    let mut files = PendingFile::begin_all(outputs.iter().map(output))?;
     let shape = Shape::read(&mut LogReader::open(log)?, is_ended)?;
     let exported = write_all(&mut reader, &shape, outputs, &mut files, is_ended)?;
     commit_all(files)?;
     Ok(exported)
-}
-
-fn check_names(log: &Path, outputs: &[(LogFormat, PathBuf)]) -> Result<(), LogExportError> {
-    for (i, (_, path)) in outputs.iter().enumerate() {
-        let place = place_of(path);
-        let other = if place == place_of(log) {
-            "the log"
-        } else if SESSION_NAMES.iter().any(|name| place == place_of(&log.with_file_name(name))) {
-            "a file of the session"
-        } else if outputs[..i].iter().any(|(_, earlier)| place == place_of(earlier)) {
-            "another output"
-        } else {
-            continue;
-        };
-        return Err(LogExportError::SameFile { path: path.clone(), other });
-    }
-    Ok(())
-}
-
-/// What a name stands for, so that two names of one file are the same: links followed, and of a file that is not there yet those to
-/// its folder.
-fn place_of(path: &Path) -> PathBuf {
-    let new = || {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some(folder.canonicalize().ok()?.join(path.file_name()?))
-    };
-    path.canonicalize().ok().or_else(new).unwrap_or_else(|| path.to_owned())
 }
 
 fn write_all(
