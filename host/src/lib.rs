@@ -8,6 +8,7 @@
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
+//! | [`assess`] | is a fit good? One answer, with its reasons, for whoever asks |
 //! | [`export`] | a robot in the formats of others, one file each |
 //! | [`kinematics`] | where every link stands, and from tool poses back to joint vectors |
 //! | [`plan`] | which poses to measure, and the way between them |
@@ -21,6 +22,7 @@
 //! SI units inside; millimetres and degrees in files and on screens, converted at the edge (see [`units`]).
 #![forbid(unsafe_code)]
 
+pub mod assess;
 pub mod board;
 pub mod cmd;
 pub mod collect;

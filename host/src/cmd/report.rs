@@ -9,8 +9,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::outcome::CommandError;
-use crate::files::{Dataset, Robot, write_atomically};
-use crate::identify::Fit;
+use crate::assess::{Assessment, Evidence};
+use crate::files::write_atomically;
 
 /// A result that can be shown as text and as JSON.
 pub(super) trait Report: Serialize {
@@ -47,11 +47,13 @@ pub(super) fn write_file(path: &Path, contents: &str) -> Result<(), CommandError
 #[error("{0}: the robot's text cannot be edited: {1}")]
 struct EditError(String, String);
 
-/// Writes the robot's file with the fitted parameters and a `[calibration]` table.
-pub(super) fn write_calibrated(path: &Path, robot: &Robot, dataset: &Dataset, fit: &Fit) -> Result<(), CommandError> {
-    let text = robot.calibrated_toml(&fit.solution.chain, &fit.calibration(robot, dataset));
+/// Writes the robot's file with what is worth keeping of a fit and a `[calibration]` table; whether there was anything.
+pub(super) fn write_calibrated(path: &Path, evidence: &Evidence<'_>, assessment: &Assessment) -> Result<bool, CommandError> {
+    let Some((chain, calibration)) = assessment.calibration(evidence) else { return Ok(false) };
+    let robot = evidence.robot;
     let broken = |error: toml_edit::TomlError| CommandError::output(EditError(robot.source_name().to_owned(), error.to_string()));
-    write_file(path, &text.map_err(broken)?)
+    write_file(path, &robot.calibrated_toml(chain, &calibration).map_err(broken)?)?;
+    Ok(true)
 }
 
 /// Says something that is no result and no error.

@@ -23,7 +23,7 @@ pub use plan_rows::{BarAt, PlanRow, RowKind, RowMargins, read_plan, write_plan};
 pub use poses::{Dataset, Motion, PoseRow, RowWarning, pose_header, pose_record, write_poses};
 pub use problem::Problem;
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
-pub use robot::{Calibration, EncoderFacts, JointLimits, MOST_NAME_BYTES, NoEncoders, Robot};
+pub use robot::{Calibration, CalibrationVerdict, EncoderFacts, JointLimits, MOST_NAME_BYTES, NoEncoders, Robot};
 pub use solids::Solids;
 pub use source::{InputError, Source};
 pub use targets::{Goal, MOST_TARGET_BYTES, Target, compensated_csv, pose_as_written, read_targets};
