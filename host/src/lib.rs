@@ -8,6 +8,7 @@
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
+//! | [`assess`] | is a fit good? One answer, with its reasons, for whoever asks |
 //! | [`export`] | a robot in the formats of others, one file each |
 //! | [`kinematics`] | where every link stands, and from tool poses back to joint vectors |
 //! | [`plan`] | which poses to measure, and the way between them |
@@ -23,6 +24,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests look at files from outside"))]
 
+pub mod assess;
 pub mod board;
 pub mod cmd;
 pub mod collect;

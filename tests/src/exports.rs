@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use ballbar::{Chain, JointKind, PARAMETERS_PER_JOINT};
-use host_cal::files::{Calibration, Robot};
+use host_cal::files::{Calibration, CalibrationVerdict, Robot};
 use nalgebra::Matrix4;
 use num_complex::Complex;
 
@@ -27,6 +27,8 @@ pub fn write_calibrated(folder: &Path, design: &str) -> Robot {
     let calibration = Calibration {
         when: "2025-01-01T00:00:00Z".into(),
         by: "a test".into(),
+        verdict: Some(CalibrationVerdict::Calibrated),
+        reasons: Vec::new(),
         from_robot: "design.toml".into(),
         from_poses: vec!["poses.csv".into()],
         poses: 100,

@@ -210,7 +210,9 @@ fn a_fit_that_predicts_poses_left_out_worse_than_the_design_is_not_written() {
     assert!(!run.stdout.contains("wrote"));
     let without_out = host_cal_in(folder.path(), &args[..8]);
     let same = run.stdout.replace("old.toml was not written\n", "");
-    assert!(same.ends_with("NOT TO BE TRUSTED AS IT IS: poses left out of the fit are predicted no better than by the design\n"));
+    let verdict = same.split_once("\nNOT TO BE TRUSTED AS IT IS\n").expect("a verdict").1;
+    assert!(verdict.starts_with("  Poses left out of the fit are predicted no better than by the design"), "{verdict}");
+    assert!(verdict.contains("--max-rms-mm raises the limit"), "{verdict}");
     assert_eq!((without_out.code, without_out.stdout), (1, same), "the verdict does not depend on --out");
 }
 
@@ -252,8 +254,10 @@ fn demo_leaves_files_for_the_commands_that_it_prints() {
 fn a_fit_of_a_robot_to_its_own_lengths_says_that_it_was_optimal_already() {
     let folder = TempDir::new().expect("a temporary folder");
     runs(&folder, &[&["simulate"], &DESIGN, &["--bar", "460", "--per-pair", "20", "--seed", "5", "--out", "poses.csv"]]);
-    let run = host_cal_in(folder.path(), &FIT);
-    assert!(run.code == 0 && headline(&run).contains("\nalready optimal"), "{}", headline(&run));
+    let run = runs(&folder, &[&FIT, &["--out", "same.toml"]]);
+    assert!(headline(&run).contains("\nalready optimal after 0 steps"), "{}", headline(&run));
+    assert!(run.stdout.contains("\nNOTHING TO CORRECT\n"), "{}", run.stdout);
+    assert!(read(&folder, "same.toml").contains("\nverdict = \"reserved\"\n"));
     assert!(run.stdout.contains("no outliers"));
     assert!(!run.stdout.contains("-0.0000"), "zero has no sign");
 }

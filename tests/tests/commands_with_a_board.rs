@@ -106,6 +106,21 @@ fn apply_refuses_what_should_not_be_on_a_board_and_keeps_what_is_there() {
     refused(folder, &seven, &["seven.toml has 7 joints, but the board counts 6 encoders"]);
     refused(folder, &["apply", "port", "--robot", "nowhere.toml"], &["nowhere.toml"]);
 
+    // What the fit was found to be stands in the file: an older one does not say, and another word is no verdict.
+    calibrated(folder);
+    let text = std::fs::read_to_string(folder.join("calibrated.toml")).unwrap();
+    let verdict = text.lines().find(|line| line.starts_with("verdict = ")).expect("a verdict");
+    std::fs::write(folder.join("older.toml"), text.replace(&format!("{verdict}\n"), "")).unwrap();
+    refused(
+        folder,
+        &["apply", "port", "--robot", "older.toml"],
+        &["older.toml", "has no verdict", "host-cal fit", "--uncalibrated"],
+    );
+    for word in ["not_trusted", "unchanged", "Calibrated", ""] {
+        std::fs::write(folder.join("odd.toml"), text.replace(verdict, &format!("verdict = \"{word}\""))).unwrap();
+        refused(folder, &["apply", "port", "--robot", "odd.toml"], &["odd.toml:", "expected `calibrated` or `reserved`"]);
+    }
+
     let after = run(folder, &["status", "port", "--json"]).json();
     for what in ["robot", "slots", "staged_crc"] {
         assert_eq!(after[what], before[what], "{what}");

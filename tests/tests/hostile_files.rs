@@ -3,7 +3,9 @@
 #[expect(dead_code, reason = "refusals are counted elsewhere")]
 mod workbench;
 
-use host_cal::files::{Calibration, Dataset, InputError, Rig, Robot, Source, UrdfEnds, parse_urdf, read_targets, write_poses};
+use host_cal::files::{
+    Calibration, CalibrationVerdict, Dataset, InputError, Rig, Robot, Source, UrdfEnds, parse_urdf, read_targets, write_poses,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use workbench::{POSES, RIG, ROBOT, Workbench};
@@ -105,6 +107,8 @@ fn a_mutant_of_a_robot_is_refused_or_has_sound_numbers_that_survive_a_rewrite() 
     let calibration = Calibration {
         when: "now".to_owned(),
         by: "a test".to_owned(),
+        verdict: Some(CalibrationVerdict::Reserved),
+        reasons: vec!["A \"length\"\nstands out.".to_owned()],
         from_robot: "mutant".to_owned(),
         from_poses: vec!["poses.csv".to_owned()],
         poses: 3,

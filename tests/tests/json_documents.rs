@@ -45,6 +45,9 @@ fn fit_documents_what_it_found() {
     assert_eq!(fit["status"], "converged");
     assert_eq!((count(&fit["rank"]), count(&fit["free_parameters"]), count(&fit["poses"])), (36, 35, 180));
     assert!((2..20).contains(&count(&fit["iterations"])));
+    assert_eq!(count(&fit["iterations"]) as usize + 1, list(&fit["rms_history_mm"]).len(), "steps, and the start");
+    assert_eq!((&fit["verdict"], &fit["objection"]), (&"reserved".into(), &Value::Null));
+    assert!(text(&fit["reasons"][0]).contains("35 were fitted"), "{}", fit["reasons"]);
     near(&fit["rms_initial_mm"], 9.427, 1e-3);
     near(&fit["rms_mm"], 0.068, 1e-3);
     assert!((10.0..1000.0).contains(&number(&fit["condition"])));
@@ -110,6 +113,7 @@ fn fit_documents_outliers_by_row_number_and_why_nothing_was_written() {
     let fit = document(&folder, 1, &[&["fit"], &DESIGN, &["noise.csv", "--hold", "paper", "--out", "calibrated.toml"]]);
     assert_eq!(fit["status"], "converged");
     assert!(text(&fit["objection"]).contains("left out"));
+    assert_eq!(fit["verdict"], "not_trusted");
     assert!(fit.get("out").is_none() && !folder.path().join("calibrated.toml").exists());
 }
 

@@ -26,6 +26,8 @@ fn a_real_irb_120_goes_from_3_232_to_0_137_mm() {
     assert!((number(&fit, "rms_initial_mm") - 3.231_980_4).abs() < 1e-6);
     assert!((number(&fit, "rms_mm") - 0.137_151_52).abs() < 1e-7);
     assert_eq!(fit["outliers"].as_array().unwrap().len(), 0);
+    assert!(fit["verdict"] == "calibrated" || fit["verdict"] == "reserved", "{}", fit["reasons"]);
+    assert!((number(&fit["held_out"], "rms_mm") - 0.349).abs() < 5e-4, "{}", fit["held_out"]);
 }
 
 #[test]
@@ -71,5 +73,5 @@ fn freeing_everything_on_the_cable_set_is_called_what_it_is() {
     let fit = run.json();
     assert_eq!(run.code, 1);
     assert_ne!(fit["status"], "converged");
-    assert!(fit["remarks"].to_string().contains("no such robot exists"), "{}", fit["remarks"]);
+    assert!(fit["reasons"].to_string().contains("no such robot exists"), "{}", fit["reasons"]);
 }

@@ -7,9 +7,10 @@ use std::fs;
 use ballbar::{FreeParameters, Kinematics};
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::experiment::Puma;
+use host_cal::assess::{Answer, Assessment, Evidence};
 use host_cal::files::{Dataset, RIGS, ROBOTS};
 use host_cal::identify::{Fit, FitOptions, LmOptions, fit, solve};
-use host_cal::report::{Answer, Facts, Inputs, figures, html};
+use host_cal::report::{Facts, Inputs, figures, html};
 use host_cal::simulate::tool_error;
 use serde_json::Value;
 use shells::{DESIGN, puma, runs};
@@ -41,16 +42,9 @@ fn facts_of(puma: &Puma, sigma_m: f64) -> (Facts, Dataset, Fit) {
 }
 
 fn facts(puma: &Puma, dataset: &Dataset, fit: &Fit) -> Facts {
-    Facts::new(&Inputs {
-        robot: &puma.design,
-        rig: &puma.rig,
-        rig_name: "triangles",
-        dataset,
-        fit,
-        unseen: &[],
-        objection: None,
-        remarks: &[],
-    })
+    let (robot, rig) = (&puma.design, &puma.rig);
+    let assessment = Assessment::new(&Evidence { robot, rig, dataset, fit, unseen: &[], max_rms_m: None });
+    Facts::new(&Inputs { robot, rig, rig_name: "triangles", dataset, fit, assessment: &assessment, remarks: &[] })
 }
 
 #[test]
@@ -128,7 +122,8 @@ fn a_fit_that_other_lengths_speak_against_is_not_called_calibrated() {
     assert_eq!(run.code, 1, "{}", run.transcript());
     let told = run.json();
     assert_eq!(told["verdict"], "not_trusted");
-    assert_eq!(told["reasons"], serde_json::json!(["The design predicts better than the fit on design.csv."]));
+    let reason = told["reasons"][0].as_str().expect("a reason");
+    assert!(reason.starts_with("The design predicts better than the fit on design.csv: RMS 0.05"), "{reason}");
     assert!(page(&folder).contains("<h1>Not to be trusted as it is</h1>"));
 }
 
@@ -174,7 +169,7 @@ fn longitude_latitude_and_length_lead_from_the_chuck_to_the_sphere() {
 fn left_out_residuals_are_those_of_a_fit_without_them() {
     let puma = Puma::default();
     let (facts, dataset, fit) = facts_of(&puma, 84e-6);
-    let proof = facts.proofs.last().expect("enough poses");
+    let proof = facts.assessment.proofs.last().expect("enough poses");
     let folds = fit.cross_validation.expect("enough poses").folds;
     // Every pose is a posture of its own here, so that rows take turns.
     let (left_out, kept): (Vec<usize>, Vec<usize>) = (0..dataset.rows.len()).partition(|row| row % folds == 0);
@@ -203,7 +198,7 @@ fn a_page_of_very_many_poses_is_no_larger_than_one_of_many() {
     let of_many = |count: usize| {
         let mut facts = facts.clone();
         facts.rows = in_turn(&facts.rows, 9, count);
-        for proof in &mut facts.proofs {
+        for proof in &mut facts.assessment.proofs {
             proof.before = in_turn(&proof.before, 9, count);
             proof.after = in_turn(&proof.after, 9, count);
         }
@@ -242,7 +237,7 @@ fn a_steady_drift_is_told_with_its_error() {
         let sentence = |name: &str| {
             figures(&facts).expect("drawn").into_iter().find(|figure| figure.name == name).expect("a figure").sentence
         };
-        (facts.trend().expect("enough poses"), sentence("time"), sentence("pairings"))
+        (facts.assessment.trend.expect("enough poses"), sentence("time"), sentence("pairings"))
     };
     let (trend, time, pairings) = told(&dataset);
     assert!(!trend.is_significant() && time.contains(" mm: no more than chance gives."), "{time}");
@@ -269,7 +264,7 @@ fn a_single_length_not_seen_is_seen_in_its_figure() {
         proof.expect("a drawing").svg.matches("<circle").count()
     };
     assert_eq!(circles(&facts), 0, "curves");
-    for residuals in facts.proofs.iter_mut().flat_map(|proof| [&mut proof.before, &mut proof.after]) {
+    for residuals in facts.assessment.proofs.iter_mut().flat_map(|proof| [&mut proof.before, &mut proof.after]) {
         residuals.truncate(1);
     }
     assert_eq!(circles(&facts), 2, "before and after");
@@ -292,10 +287,10 @@ fn an_outlier_drift_and_few_parameters_are_reasons_for_reserve() {
     let puma = Puma::default();
     let mut dataset = puma.shells(0.46, 30, 84e-6, 3);
     let fitted = |dataset: &Dataset| fit(&puma.design, dataset, &FitOptions::default()).expect("enough poses");
-    assert_eq!(facts(&puma, &dataset, &fitted(&dataset)).verdict().answer, Answer::Calibrated);
+    assert_eq!(facts(&puma, &dataset, &fitted(&dataset)).assessment.answer, Answer::Calibrated);
 
     let reasons = |dataset: &Dataset| {
-        let verdict = facts(&puma, dataset, &fitted(dataset)).verdict();
+        let verdict = facts(&puma, dataset, &fitted(dataset)).assessment;
         assert_eq!(verdict.answer, Answer::Reserved, "{:?}", verdict.reasons);
         verdict.reasons.join(" ")
     };
@@ -305,13 +300,13 @@ fn an_outlier_drift_and_few_parameters_are_reasons_for_reserve() {
     dataset.rows[17].measurement.length_m -= 2e-3;
     let drifting = |mut dataset: Dataset| {
         for (i, row) in dataset.rows.iter_mut().enumerate() {
-            row.measurement.length_m += 3e-3 * (i as f64 / 60.0).sin();
+            row.measurement.length_m += 1e-3 * (i as f64 / 60.0).sin();
         }
         dataset
     };
     // Pairing by pairing, the same drift is as if the pairings were off.
     let by_pairing = drifting(dataset.clone());
-    let offset = facts(&puma, &by_pairing, &fitted(&by_pairing)).farthest_offset().expect("enough poses");
+    let offset = facts(&puma, &by_pairing, &fitted(&by_pairing)).assessment.farthest_offset.expect("enough poses");
     assert!(offset.is_beyond_chance, "{offset:?}");
     dataset.rows = in_turn(&dataset.rows, 9, dataset.rows.len());
     let dataset = drifting(dataset);
@@ -329,7 +324,7 @@ fn a_robot_that_is_as_designed_has_nothing_to_correct() {
     let dataset = same.shells(0.46, 30, 0.0, 3);
     let fit = fit(&puma.design, &dataset, &FitOptions::default()).expect("enough poses");
     let facts = facts(&puma, &dataset, &fit);
-    assert_eq!(facts.verdict().answer, Answer::Unchanged, "{:?}", facts.verdict());
+    assert_eq!(facts.assessment.answer, Answer::Unchanged, "{:?}", facts.assessment.reasons);
     let figures = figures(&facts).expect("drawn");
     let missing: Vec<&str> = figures.iter().filter(|figure| figure.drawing.is_none()).map(|figure| figure.name).collect();
     assert_eq!(missing, ["histogram"], "residuals of exactly zero have no distribution");

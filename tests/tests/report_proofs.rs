@@ -6,9 +6,10 @@ use ballbar::Kinematics;
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::data::real_data;
 use ballbar_tests::experiment::{Puma, dataset};
+use host_cal::assess::{Assessment, Evidence, ProofKind};
 use host_cal::files::{Dataset, PairingId, PoseRow};
 use host_cal::identify::{Fit, FitOptions, fit};
-use host_cal::report::{Facts, Inputs, ProofKind};
+use host_cal::report::{Facts, Inputs};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -41,12 +42,13 @@ fn fitted(puma: &Puma, rows: &Dataset) -> Fit {
 }
 
 fn facts(puma: &Puma, rows: &Dataset, fit: &Fit, unseen: &[(String, &Dataset)]) -> Facts {
-    let (rig, remarks) = (&puma.rig, &[][..]);
-    Facts::new(&Inputs { robot: &puma.design, rig, rig_name: "triangles", dataset: rows, fit, unseen, objection: None, remarks })
+    let (robot, rig) = (&puma.design, &puma.rig);
+    let assessment = Assessment::new(&Evidence { robot, rig, dataset: rows, fit, unseen, max_rms_m: None });
+    Facts::new(&Inputs { robot, rig, rig_name: "triangles", dataset: rows, fit, assessment: &assessment, remarks: &[] })
 }
 
 fn kinds(facts: &Facts) -> Vec<ProofKind> {
-    facts.proofs.iter().map(|proof| proof.kind).collect()
+    facts.assessment.proofs.iter().map(|proof| proof.kind).collect()
 }
 
 #[test]
@@ -66,9 +68,9 @@ fn other_lengths_of_fitted_postures_are_no_proof_to_go_by() {
     let unseen = [("sphere 3".to_owned(), &held_out), ("other postures".to_owned(), &other_postures)];
     let facts = facts(&puma, &rows, &fit, &unseen);
     assert_eq!(kinds(&facts), [ProofKind::Apart, ProofKind::LeftOut, ProofKind::SamePostures]);
-    let rms_m: Vec<f64> = facts.proofs.iter().map(|proof| proof.after_summary().rms_m).collect();
+    let rms_m: Vec<f64> = facts.assessment.proofs.iter().map(|proof| proof.after_summary().rms_m).collect();
     assert!(rms_m[2] < rms_m[0].max(rms_m[1]), "what shares its errors with the fit looks better: {rms_m:?}");
-    assert_ne!(facts.decisive_proof().unwrap().kind, ProofKind::SamePostures);
+    assert_ne!(facts.assessment.decisive_proof().unwrap().kind, ProofKind::SamePostures);
 }
 
 #[test]
@@ -79,7 +81,7 @@ fn the_worst_proof_decides_whatever_comes_first() {
     let (good, bad) = (puma.shells(0.61, 5, 84e-6, 4), puma.shells(0.61, 5, 3e-3, 5));
     let names = |unseen: [(&str, &Dataset); 2]| {
         let facts = facts(&puma, &rows, &fit, &unseen.map(|(name, rows)| (name.to_owned(), rows)));
-        (facts.decisive_proof().unwrap().name.clone(), facts.verdict().reasons.len())
+        (facts.assessment.decisive_proof().unwrap().name.clone(), facts.assessment.reasons.len())
     };
     let expected = ("bad".to_owned(), 1);
     assert_eq!(names([("good", &good), ("bad", &bad)]), expected);
@@ -96,7 +98,7 @@ fn the_standard_error_is_that_of_postures_and_not_of_lengths() {
         .map(|seed| {
             let set = three_lengths_a_posture(&puma, 4, 0.0, 100 + seed);
             let facts = facts(&puma, &rows, &fit, &[("set".to_owned(), &set)]);
-            (facts.proofs[0].after_summary().rms_m, facts.proofs[0].rms_error_m().unwrap())
+            (facts.assessment.proofs[0].after_summary().rms_m, facts.assessment.proofs[0].rms_error_m().unwrap())
         })
         .collect();
     let count = sets.len() as f64;

@@ -13,7 +13,7 @@ use super::report::{Report, print, progress, warn};
 use crate::board::{
     BoardError, BoardLink, KinematicsDifference, NOMINAL_TRAVEL_M, RobotOnBoard, nominal_lvdt, parameter_set, verify_kinematics,
 };
-use crate::files::Robot;
+use crate::files::{CalibrationVerdict, Robot};
 use crate::text::one_line;
 
 /// Upload a calibrated robot to the board, and verify the board's kinematics against this program's
@@ -42,6 +42,12 @@ enum ApplyError {
     #[error("{0} has no [calibration]: it holds design parameters, not fitted ones")]
     #[diagnostic(help("Fit it first: host-cal fit … --out calibrated.toml. To upload it as it is: --uncalibrated"))]
     NotCalibrated(String),
+    #[error("{0}: its [calibration] has no verdict, so that nothing says the fit was good")]
+    #[diagnostic(help(
+        "An older host-cal wrote it, or somebody changed it. Fit the design to the poses again: host-cal fit … --out calibrated.toml. To upload \
+         it as it is: --uncalibrated"
+    ))]
+    NotJudged(String),
     #[error("{robot} has {joints} joints, but the board counts {encoders} encoders")]
     #[diagnostic(help("Nothing was changed on the board."))]
     TooManyJoints { robot: String, joints: usize, encoders: u8 },
@@ -63,6 +69,11 @@ pub(super) struct ApplyReport {
     port: String,
     robot: String,
     calibrated: bool,
+    /// Of the fit that wrote the robot's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<CalibrationVerdict>,
+    /// What weighs on it.
+    reasons: Vec<String>,
     replaced: Option<String>,
     crc: String,
     /// Commits that this board has seen.
@@ -76,8 +87,8 @@ pub(super) struct ApplyReport {
 impl ApplyArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let robot = Robot::open(&self.robot)?;
-        if robot.calibration.is_none() && !self.uncalibrated {
-            return Err(ApplyError::NotCalibrated(robot.source_name().to_owned()).into());
+        if !self.uncalibrated {
+            check_calibrated(&robot)?;
         }
         // All that can be wrong with the file is found before the board is spoken to.
         parameter_set(&robot, nominal_lvdt(NOMINAL_TRAVEL_M))?;
@@ -89,6 +100,16 @@ impl ApplyArgs {
         let report = upload(&mut link, &robot, self.vectors as usize)?;
         print(&report, self.output.json)?;
         Ok(Outcome::Good)
+    }
+}
+
+/// A robot is put on the board when its fit was found to be good, with reservations or without.
+fn check_calibrated(robot: &Robot) -> Result<(), ApplyError> {
+    let name = || robot.source_name().to_owned();
+    match (&robot.calibration, robot.verdict()) {
+        (_, Some(CalibrationVerdict::Calibrated | CalibrationVerdict::Reserved)) => Ok(()),
+        (Some(_), None) => Err(ApplyError::NotJudged(name())),
+        (None, None) => Err(ApplyError::NotCalibrated(name())),
     }
 }
 
@@ -123,7 +144,9 @@ pub(super) fn upload(link: &mut BoardLink, robot: &Robot, vectors: usize) -> Res
     Ok(ApplyReport {
         port: link.port_name().to_owned(),
         robot: robot.name.clone(),
-        calibrated: robot.calibration.is_some(),
+        calibrated: robot.verdict().is_some(),
+        verdict: robot.verdict(),
+        reasons: robot.calibration.as_ref().map_or_else(Vec::new, |calibration| calibration.reasons.clone()),
         replaced: old.as_ref().map(|old| old.set().name.as_str().to_owned()),
         crc: format!("{crc:08x}"),
         sequence,
@@ -172,9 +195,10 @@ fn bytes_of(set: &ParameterSet) -> Vec<u8> {
 impl Report for ApplyReport {
     fn text(&self) -> String {
         let what = if self.calibrated { "calibrated" } else { "UNCALIBRATED" };
+        let reasons: String = self.reasons.iter().map(|reason| format!("with a reservation: {reason}\n")).collect();
         let before = self.replaced.as_ref().map_or("nothing".into(), |name| format!("`{}`", one_line(name)));
         format!(
-            "{}: {what} robot `{}` stored (CRC {}, commit {}) in place of {before}\nread back bit for bit; LVDT curve {}\n\
+            "{}: {what} robot `{}` stored (CRC {}, commit {}) in place of {before}\n{reasons}read back bit for bit; LVDT curve {}\n\
              {} joint vectors: the board's poses differ from this program's by at most {:.3} µm and {:.3} µrad\n",
             one_line(&self.port),
             one_line(&self.robot),

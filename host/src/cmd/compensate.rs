@@ -12,7 +12,7 @@ use super::inputs::{ForceArgs, ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use super::table::{Columns, fixed};
-use crate::files::{FileKind, Output, Robot, Source, Target, compensated_csv, read_targets};
+use crate::files::{CalibrationVerdict, FileKind, Output, Robot, Source, Target, compensated_csv, read_targets};
 use crate::kinematics::{Compensation, Compensator, link_angles};
 use crate::text::shown_path;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
@@ -125,9 +125,7 @@ impl CompensateArgs {
     fn warnings(&self, robot: &Robot, done: &[(usize, Compensation)], not_reached: &[NotReached]) -> Vec<String> {
         let place = |line: usize| format!("{}:{line}", self.targets.display());
         let mut warnings = Vec::new();
-        if robot.calibration.is_none() {
-            warnings.push("the robot has no [calibration]: its file says nothing of having been fitted".to_owned());
-        }
+        warnings.extend(standing_warning(robot));
         warnings.extend(not_reached.iter().map(|missed| format!("{}: {}", place(missed.line), missed.why)));
         for (line, found) in done {
             if let Some((joint, unit, turn)) = far_turn(robot, found) {
@@ -209,6 +207,18 @@ fn compensated(
         }
     }
     (done, not_reached)
+}
+
+/// What its file says of the robot, where that is not that it is calibrated.
+fn standing_warning(robot: &Robot) -> Option<String> {
+    match (&robot.calibration, robot.verdict()) {
+        (_, Some(CalibrationVerdict::Calibrated)) => None,
+        (Some(calibration), Some(CalibrationVerdict::Reserved)) => {
+            Some(format!("the robot is calibrated with reservations: {}", calibration.reasons.join(" ")))
+        }
+        (Some(_), None) => Some("the robot's [calibration] has no verdict: nothing says that the fit was good".to_owned()),
+        (None, _) => Some("the robot has no [calibration]: its file says nothing of having been fitted".to_owned()),
+    }
 }
 
 /// The joint that goes farthest from where the controller would have it, and how far, in its unit of SI, if that is far.

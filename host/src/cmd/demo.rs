@@ -14,6 +14,7 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated, write_file, write_files};
 use super::table::Columns;
+use crate::assess::{Assessment, Evidence};
 use crate::board::{StreamLosses, rms_kinematics};
 use crate::files::{Dataset, FileKind, Output, RIGS, ROBOTS, Rig, Robot, Source};
 use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
@@ -81,6 +82,12 @@ struct ForeignFolderError {
     folder: PathBuf,
 }
 
+/// Of no seed that was tried.
+#[derive(Debug, Error, Diagnostic)]
+#[error("the simulated calibration is not to be trusted: {0}")]
+#[diagnostic(help("Give another seed with --seed."))]
+struct RefusedError(String);
+
 /// What the demo printed, left among its files; by it the demo knows its own folder again.
 const SUMMARY_NAME: &str = "demo.txt";
 const FITTED_BAR_MM: f64 = 460.0;
@@ -116,7 +123,12 @@ impl DemoArgs {
         write_files(&written.collect::<Vec<_>>(), false)?;
         let calibrated_name = "calibrated.toml";
         let calibrated_path = self.out.join(calibrated_name);
-        write_calibrated(&calibrated_path, false, design, &fitted_poses, &fit)?;
+        let unseen = [(other_name.to_owned(), &other_poses)];
+        let evidence = Evidence { robot: design, rig, dataset: &fitted_poses, fit: &fit, unseen: &unseen, max_rms_m: None };
+        let assessment = Assessment::new(&evidence);
+        if !write_calibrated(&calibrated_path, false, &evidence, &assessment)? {
+            return Err(RefusedError(assessment.reasons.join(" ")).into());
+        }
 
         let board = put_on_board(&mut bench, &scene.truth, &Robot::open(&calibrated_path.to_string_lossy())?)?;
         let names = files.iter().map(|(name, ..)| *name).chain([calibrated_name]);
@@ -125,7 +137,7 @@ impl DemoArgs {
         let report = DemoReport::new(&scene, &fit, &other_poses, board, losses, names, &self.out);
         self.write_summary(&report.text())?;
         print(&report, self.output.json)?;
-        Ok(if fit.objection().is_none() { Outcome::Good } else { Outcome::Doubtful })
+        Ok(Outcome::Good)
     }
 
     /// Makes the folder; one that holds other things than an earlier demo's is left alone.

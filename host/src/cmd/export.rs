@@ -11,7 +11,7 @@ use super::inputs::{ForceArgs, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use crate::export::{Format, JointZero, export};
-use crate::files::{Output, Robot};
+use crate::files::{CalibrationVerdict, Output, Robot};
 use crate::kinematics::NearlyParallel;
 use crate::text::{one_line, shown_path};
 use crate::units::mm_from_m;
@@ -50,7 +50,12 @@ struct NoUrdf;
 struct ExportReport {
     robot: String,
     format: String,
+    #[serde(skip)]
+    standing: &'static str,
     calibrated: bool,
+    /// Of the fit that wrote the robot's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<CalibrationVerdict>,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<PathBuf>,
     /// The file, where it was not written.
@@ -90,7 +95,9 @@ impl ExportArgs {
         let report = ExportReport {
             robot: robot.name.clone(),
             format: self.format.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned()),
-            calibrated: robot.calibration.is_some(),
+            standing: robot.standing(),
+            calibrated: robot.verdict().is_some(),
+            verdict: robot.verdict(),
             out: self.out.clone(),
             text: self.out.is_none().then_some(exported.text),
             largest_difference_mm: exported.largest_difference.map(|(off_m, _)| mm_from_m(off_m)),
@@ -117,7 +124,7 @@ impl Report for ExportReport {
             return text.clone();
         }
         let out = self.out.as_deref().map_or_else(String::new, shown_path);
-        let mut text = format!("{} is written to {out}\n", one_line(&self.robot));
+        let mut text = format!("{} ({}) is written to {out}\n", one_line(&self.robot), self.standing);
         if let (Some(mm), Some(deg)) = (self.largest_difference_mm, self.largest_difference_deg) {
             text += &format!("largest difference to the robot over random joint vectors: {mm:.1e} mm, {deg:.1e} degrees\n");
         }

@@ -7,17 +7,16 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::hold_out::HeldOutRows;
-use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs};
+use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::lines::{NotIdentified, PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated};
 use super::table::{Columns, fixed};
+use crate::assess::{Answer, Assessment, Evidence, Refusal};
 use crate::files::{Dataset, Rig};
-use crate::identify::{
-    ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, plausible_error, remarks,
-};
+use crate::identify::{ALIKE, ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, remarks};
 use crate::text::one_line;
-use crate::units::{ScreenUnit, mm_from_m};
+use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
 
 /// Identify the robot's parameters from measured poses
 #[derive(Args)]
@@ -31,8 +30,11 @@ use crate::units::{ScreenUnit, mm_from_m};
   none    hold nothing; redundant parameters then share their changes
   x1,...  hold just these, or these besides a rule: auto,scale3
 
-The file is written only when the fit reached a minimum and predicts poses left out of it better
-than the design does; otherwise the exit code is 1.")]
+The file is written only when the result can be believed: the fit reached a minimum, predicts poses
+left out of it better than the design does by two standard errors, leaves an RMS that can be noise,
+and changes nothing by more than robots differ from their designs. Otherwise the exit code is 1, and
+what may be wrong with the poses is said. Where the robot's file is as good as a fit, its parameters
+stay as they are, and are written.")]
 pub(super) struct FitArgs {
     #[command(flatten)]
     measured: MeasuredArgs,
@@ -42,6 +44,9 @@ pub(super) struct FitArgs {
     /// What damps the steps: the identity as in the paper, or the diagonal of the normal matrix
     #[arg(long, value_enum, default_value_t = DampingArg::Identity)]
     damping: DampingArg,
+    /// The largest RMS residual that is believed [default: ten times the poses' sigma_mm, or 1 where they have none]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    max_rms_mm: Option<f64>,
     /// Write the calibrated robot to this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -70,6 +75,7 @@ pub(super) struct FitReport {
     parameters_total: usize,
     independent_expected: usize,
     free_parameters: usize,
+    /// Steps from the start to the end.
     iterations: usize,
     poses: usize,
     rms_initial_mm: f64,
@@ -97,8 +103,16 @@ pub(super) struct FitReport {
     warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     out: Option<String>,
-    /// Why the result is not to be kept; nothing was written then.
-    pub(super) objection: Option<String>,
+    /// `calibrated`, `unchanged`, `reserved` or `not_trusted`, as of `report`.
+    verdict: &'static str,
+    /// Why it is no better.
+    reasons: Vec<String>,
+    /// The reasons in one, where the result is not to be kept; nothing was written then.
+    objection: Option<String>,
+    #[serde(skip)]
+    answer: Answer,
+    #[serde(skip)]
+    can_be_raised: bool,
     #[serde(skip)]
     asked_out: Option<String>,
 }
@@ -148,24 +162,28 @@ impl FitArgs {
             DampingArg::Identity => Damping::Identity,
             DampingArg::Diagonal => Damping::Diagonal,
         };
+        check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
-        let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, damping })?;
+        let Measured { robot, rig, dataset, .. } = &measured;
+        let fit = fit(robot, dataset, &FitOptions { hold, damping })?;
+        let unseen: Vec<(String, &Dataset)> = measured.unseen().into_iter().collect();
+        let evidence = Evidence { robot, rig, dataset, fit: &fit, unseen: &unseen, max_rms_m: self.max_rms_mm.map(m_from_mm) };
+        let assessment = Assessment::new(&evidence);
 
-        let mut report = FitReport::new(&measured, &fit);
+        let mut report = FitReport::new(&measured, &fit, &assessment);
         if let Some(path) = &self.out {
             report.asked_out = Some(path.display().to_string());
-            if report.objection.is_none() {
-                write_calibrated(path, self.replace.force, &measured.robot, &measured.dataset, &fit)?;
+            if write_calibrated(path, self.replace.force, &evidence, &assessment)? {
                 report.out = report.asked_out.clone();
             }
         }
         print(&report, self.output.json)?;
-        Ok(if report.objection.is_none() { Outcome::Good } else { Outcome::Doubtful })
+        Ok(if report.answer == Answer::NotTrusted { Outcome::Doubtful } else { Outcome::Good })
     }
 }
 
 impl FitReport {
-    pub(super) fn new(measured: &Measured, fit: &Fit) -> Self {
+    fn new(measured: &Measured, fit: &Fit, assessment: &Assessment) -> Self {
         let Measured { robot, rig, dataset, held_out, warnings, .. } = measured;
         let held_out_rows = held_out.as_ref().map(|(rule, rows)| HeldOutRows::new(rule, rows, robot, &fit.solution.chain));
         let test = match fit.solution.status {
@@ -184,7 +202,7 @@ impl FitReport {
             parameters_total: fit.parameters.len(),
             independent_expected: robot.chain.independent_parameters(),
             free_parameters: fit.free_parameters(),
-            iterations: fit.solution.iterations,
+            iterations: fit.solution.steps(),
             poses: dataset.rows.len(),
             rms_initial_mm: mm_from_m(fit.initial.rms_m),
             rms_mm: mm_from_m(fit.fitted.rms_m),
@@ -203,15 +221,15 @@ impl FitReport {
             remarks: remarks(&robot.chain, dataset, rig, &robot.limits)
                 .into_iter()
                 .chain(outlier_remark(dataset, fit))
-                .chain(runaway_remark(fit))
                 .chain(drift_remark(fit))
                 .collect(),
             warnings: warnings.clone(),
             out: None,
-            objection: fit
-                .objection()
-                .map(|objection| objection.to_string())
-                .or_else(|| held_out_rows.as_ref().and_then(HeldOutRows::objection)),
+            verdict: assessment.answer.name(),
+            reasons: assessment.reasons.clone(),
+            objection: (assessment.answer == Answer::NotTrusted).then(|| assessment.reasons.join(" ")),
+            answer: assessment.answer,
+            can_be_raised: assessment.refusals.iter().any(|refusal| matches!(refusal, Refusal::TooLarge { .. })),
             held_out_rows,
             asked_out: None,
         }
@@ -260,25 +278,8 @@ fn outlier_remark(dataset: &Dataset, fit: &Fit) -> Option<String> {
     ))
 }
 
-/// Parameters that went where no robot's are.
-pub(super) fn runaway_remark(fit: &Fit) -> Option<String> {
-    const IMPLAUSIBLY_FAR: f64 = 20.0;
-    let far = |parameter: &&FittedParameter| {
-        (parameter.fitted - parameter.initial).abs() > IMPLAUSIBLY_FAR * plausible_error(parameter.unit)
-    };
-    let names: Vec<String> = fit.parameters.iter().filter(far).map(|parameter| parameter.parameter.to_string()).collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "{} moved by more than {IMPLAUSIBLY_FAR} times what a design may be off: these poses do not tell them, and no such robot \
-             exists. Hold them, or let --hold auto choose.",
-            names.join(", ")
-        )
-    })
-}
-
 /// What residuals that follow one another mean for the result.
 fn drift_remark(fit: &Fit) -> Option<String> {
-    const ALIKE: f64 = 0.5;
     let correlation = fit.neighbour_correlation.filter(|&correlation| correlation > ALIKE)?;
     Some(format!(
         "Residuals follow one another in the order of measurement (correlation {correlation:.2}): something drifts or jumps that the model \
@@ -332,9 +333,7 @@ impl Report for FitReport {
         text += "\nlargest residuals (measured less computed)\n";
         text += &largest_text(&self.largest);
         text += &self.outliers_text();
-        if let Some(objection) = &self.objection {
-            text += &format!("\nNOT TO BE TRUSTED AS IT IS: {objection}\n");
-        }
+        text += &self.verdict_text();
         text + &match (&self.out, &self.asked_out) {
             (Some(out), _) => format!("\nwrote {}\n", one_line(out)),
             (None, Some(asked)) => format!("{} was not written\n", one_line(asked)),
@@ -367,6 +366,17 @@ impl FitReport {
         }
         text += "\n";
         text + &self.held_out_rows.as_ref().map_or(String::new(), HeldOutRows::text)
+    }
+
+    fn verdict_text(&self) -> String {
+        let mut text = format!("\n{}\n", self.answer.words().to_uppercase());
+        for reason in &self.reasons {
+            text += &format!("  {reason}\n");
+        }
+        if self.can_be_raised {
+            text += "  Where robot and bar are no better than that, --max-rms-mm raises the limit.\n";
+        }
+        text
     }
 
     fn pairings_text(&self) -> String {

@@ -153,14 +153,6 @@ impl HeldOutRows {
         }
     }
 
-    /// Why the fit is not to be kept, if these rows say so.
-    pub(super) fn objection(&self) -> Option<String> {
-        (self.rms_mm > self.rms_initial_mm).then(|| {
-            let Self { rule, rms_mm, rms_initial_mm, .. } = self;
-            format!("the poses held out ({rule}) are predicted worse than by the design: {rms_mm:.4} mm, before {rms_initial_mm:.4} mm")
-        })
-    }
-
     pub(super) fn text(&self) -> String {
         format!(
             "held out ({}), {} poses: RMS {:.4} mm before, {:.4} mm after, mean {:.4} mm, largest {:.4} mm\n",

@@ -59,6 +59,13 @@ pub(super) struct Measured {
     pub(super) warnings: Vec<String>,
 }
 
+impl Measured {
+    /// The poses kept apart, and what to call them.
+    pub(super) fn unseen(&self) -> Option<(String, &Dataset)> {
+        self.held_out.as_ref().map(|(rule, rows)| (format!("poses held out ({rule})"), rows))
+    }
+}
+
 impl MeasuredArgs {
     /// Reads the files and says on stderr what may be wrong with them.
     pub(super) fn read(&self) -> Result<Measured, CommandError> {
@@ -95,6 +102,14 @@ impl MeasuredArgs {
             }
             Some((first, _)) => Ok(first.display().to_string()),
         }
+    }
+}
+
+/// Whether `--max-rms-mm` can be a limit.
+pub(super) fn check_max_rms_mm(limit: Option<f64>) -> Result<(), ListError> {
+    match limit.filter(|&limit| limit.is_nan() || limit <= 0.0) {
+        Some(limit) => Err(ListError::Number { flag: "--max-rms-mm", found: limit.to_string(), expected: "a number above zero" }),
+        None => Ok(()),
     }
 }
 

@@ -179,7 +179,7 @@ fn numbers(experiment: &Experiment) -> Vec<Number> {
             "iterations",
             "1",
             Some(count(stated::ITERATIONS)),
-            count(fit.solution.iterations),
+            count(fit.solution.steps()),
             "paper: within ten in most cases",
         ),
         number("RMS residual before, 46 cm shells", "mm", None, mm_from_m(fit.initial.rms_m), ""),

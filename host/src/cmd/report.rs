@@ -10,8 +10,8 @@ use thiserror::Error;
 use super::out;
 pub(super) use super::out::warn;
 use super::outcome::CommandError;
-use crate::files::{Dataset, FileKind, Output, PendingFile, Robot, commit_all, write_atomically};
-use crate::identify::Fit;
+use crate::assess::{Assessment, Evidence};
+use crate::files::{FileKind, Output, PendingFile, commit_all, write_atomically};
 use crate::text::visible_json;
 
 /// A result that can be shown as text and as JSON.
@@ -87,17 +87,19 @@ pub(super) fn write_session_file(path: &Path, contents: &str) -> Result<(), Comm
 #[error("{0}: the robot's text cannot be edited: {1}")]
 struct EditError(String, String);
 
-/// Writes the robot's file with the fitted parameters and a `[calibration]` table.
+/// Writes the robot's file with what is worth keeping of a fit and a `[calibration]` table; whether there was anything.
 pub(super) fn write_calibrated(
     path: &Path,
     force: bool,
-    robot: &Robot,
-    dataset: &Dataset,
-    fit: &Fit,
-) -> Result<(), CommandError> {
-    let text = robot.calibrated_toml(&fit.solution.chain, &fit.calibration(robot, dataset));
+    evidence: &Evidence<'_>,
+    assessment: &Assessment,
+) -> Result<bool, CommandError> {
+    let Some((chain, calibration)) = assessment.calibration(evidence) else { return Ok(false) };
+    let robot = evidence.robot;
     let broken = |error: toml_edit::TomlError| CommandError::output(EditError(robot.source_name().to_owned(), error.to_string()));
-    write_file(Output { path, kind: FileKind::Robot, force }, &text.map_err(broken)?)
+    let text = robot.calibrated_toml(chain, &calibration).map_err(broken)?;
+    write_file(Output { path, kind: FileKind::Robot, force }, &text)?;
+    Ok(true)
 }
 
 /// A progress bar on stderr, drawn only where that is a terminal.

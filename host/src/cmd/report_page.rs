@@ -8,15 +8,15 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::fit::{FitReport, runaway_remark};
-use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, poses_of};
+use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm, poses_of};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_files};
+use crate::assess::{Answer, Assessment, Evidence};
 use crate::files::{Dataset, FileKind, Output, PoseRow};
 use crate::identify::{FitOptions, Hold, fit, remarks};
-use crate::report::{Answer, Facts, Figure, Inputs, Verdict, figures, html, parameters_table};
+use crate::report::{Facts, Figure, Inputs, figures, html, parameters_table};
 use crate::text::one_line;
-use crate::units::mm_from_m;
+use crate::units::{m_from_mm, mm_from_m};
 
 /// Show a calibration as one page: is the robot calibrated, how good is it, how do we know
 #[derive(Args)]
@@ -35,6 +35,9 @@ pub(super) struct ReportArgs {
     /// Parameters to leave at their design values, as `fit` takes them
     #[arg(long, default_value = "auto", value_name = "RULE|NAME,…")]
     hold: String,
+    /// The largest RMS residual that is believed, as `fit` takes it
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    max_rms_mm: Option<f64>,
     /// Write the page to this file
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -100,25 +103,27 @@ struct SeenError {
 impl ReportArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let hold: Hold = self.hold.parse()?;
+        check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
         let others = self.others(&measured)?;
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;
         let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, ..FitOptions::default() })?;
 
-        let told = FitReport::new(&measured, &fit);
         let remarks = remarks(&measured.robot.chain, &measured.dataset, &measured.rig, &measured.robot.limits);
-        let held_out = measured.held_out.iter().map(|(rule, rows)| (format!("poses held out ({rule})"), rows));
-        let unseen: Vec<(String, &Dataset)> = others.iter().map(|(name, rows)| (name.clone(), rows)).chain(held_out).collect();
+        let unseen: Vec<(String, &Dataset)> =
+            others.iter().map(|(name, rows)| (name.clone(), rows)).chain(measured.unseen()).collect();
+        let Measured { robot, rig, dataset, .. } = &measured;
+        let max_rms_m = self.max_rms_mm.map(m_from_mm);
+        let assessment = Assessment::new(&Evidence { robot, rig, dataset, fit: &fit, unseen: &unseen, max_rms_m });
         let facts = Facts::new(&Inputs {
-            robot: &measured.robot,
-            rig: &measured.rig,
+            robot,
+            rig,
             rig_name: &measured.rig_name,
-            dataset: &measured.dataset,
+            dataset,
             fit: &fit,
-            unseen: &unseen,
-            objection: told.objection.as_deref(),
-            remarks: &remarks.into_iter().chain(runaway_remark(&fit)).chain(measured.warnings).collect::<Vec<_>>(),
+            assessment: &assessment,
+            remarks: &remarks.into_iter().chain(measured.warnings.iter().cloned()).collect::<Vec<_>>(),
         });
         let figures = figures(&facts)?;
 
@@ -165,8 +170,8 @@ impl ReportArgs {
 
 impl PageReport {
     fn new(out: &Path, facts: &Facts, figures: &[Figure]) -> Self {
-        let Verdict { answer, reasons, .. } = facts.verdict();
-        let unseen = facts.proofs.iter().map(|proof| {
+        let Assessment { answer, reasons, proofs, .. } = &facts.assessment;
+        let unseen = proofs.iter().map(|proof| {
             let after = proof.after_summary();
             Unseen {
                 name: proof.name.clone(),
@@ -181,8 +186,8 @@ impl PageReport {
         Self {
             out: out.display().to_string(),
             verdict: answer.name(),
-            answer,
-            reasons,
+            answer: *answer,
+            reasons: reasons.clone(),
             poses: facts.rows.len(),
             rms_initial_mm: mm_from_m(facts.before.rms_m),
             rms_mm: mm_from_m(facts.after.rms_m),

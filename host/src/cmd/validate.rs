@@ -3,11 +3,12 @@
 use clap::Args;
 use serde::Serialize;
 
-use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs};
+use super::inputs::{Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::lines::{PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
 use super::table::{Columns, fixed};
+use crate::files::CalibrationVerdict;
 use crate::identify::{ResidualSummary, by_pairing, residuals};
 use crate::units::mm_from_m;
 
@@ -30,6 +31,11 @@ pub(super) struct ValidateArgs {
 struct ValidateReport {
     robot: String,
     calibrated: bool,
+    /// Of the fit that wrote the robot's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<CalibrationVerdict>,
+    #[serde(skip)]
+    standing: &'static str,
     /// The rule of --hold-out.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<String>,
@@ -46,10 +52,7 @@ struct ValidateReport {
 
 impl ValidateArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        if let Some(limit) = self.max_rms_mm.filter(|&limit| limit.is_nan() || limit <= 0.0) {
-            let found = limit.to_string();
-            return Err(ListError::Number { flag: "--max-rms-mm", found, expected: "a number above zero" }.into());
-        }
+        check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
         let report = self.report(measured);
         print(&report, self.output.json)?;
@@ -63,7 +66,9 @@ impl ValidateArgs {
         let summary = ResidualSummary::new(&residuals);
         let rms_mm = mm_from_m(summary.rms_m);
         ValidateReport {
-            calibrated: robot.calibration.is_some(),
+            calibrated: robot.verdict().is_some(),
+            verdict: robot.verdict(),
+            standing: robot.standing(),
             robot: robot.name,
             held_out: rule,
             poses: summary.count,
@@ -80,9 +85,8 @@ impl ValidateArgs {
 
 impl Report for ValidateReport {
     fn text(&self) -> String {
-        let calibrated = if self.calibrated { "calibrated" } else { "not calibrated" };
         let rule = self.held_out.as_ref().map_or(String::new(), |rule| format!(" held out ({rule})"));
-        let mut text = format!("{} ({calibrated}), {} poses{rule}\n\n", self.robot, self.poses);
+        let mut text = format!("{} ({}), {} poses{rule}\n\n", self.robot, self.standing, self.poses);
         text += &format!("RMS {:.4} mm, mean {:.4} mm, largest {:.4} mm\n\n", self.rms_mm, self.mean_mm, self.max_abs_mm);
         let mut table = Columns::new(&["<pairing", "poses", "RMS mm", "mean mm", "largest mm"]);
         for line in &self.by_pairing {

@@ -119,6 +119,5 @@ fn model_lines(mark: &str) -> String {
 
 /// Where a robot's numbers come from, in a line for a comment.
 fn origin(robot: &Robot) -> String {
-    let is_calibrated = if robot.calibration.is_some() { "calibrated" } else { "design, not calibrated" };
-    format!("{}: {is_calibrated}. Written by host-cal {}.", plain_name(robot), env!("CARGO_PKG_VERSION"))
+    format!("{}: {}. Written by host-cal {}.", plain_name(robot), robot.standing(), env!("CARGO_PKG_VERSION"))
 }

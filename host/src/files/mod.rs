@@ -29,7 +29,7 @@ pub use poses::{Dataset, Motion, PoseRow, RowWarning, pose_header, pose_record, 
 pub use problem::Problem;
 pub use protect::Refusal;
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
-pub use robot::{Calibration, EncoderFacts, JointLimits, MOST_NAME_BYTES, NoEncoders, Robot};
+pub use robot::{Calibration, CalibrationVerdict, EncoderFacts, JointLimits, MOST_NAME_BYTES, NoEncoders, Robot};
 pub use solids::Solids;
 pub use source::{InputError, Source};
 pub use targets::{Goal, Target, compensated_csv, pose_as_written, read_targets};

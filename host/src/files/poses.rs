@@ -96,6 +96,13 @@ impl Dataset {
         corrected
     }
 
+    /// What `sigma_mm` says that `√w f` scatter by, the residuals times the root of their weight, metres: the same for all rows. `None`
+    /// where it is not given.
+    pub fn stated_sigma_m(&self) -> Option<f64> {
+        let row = self.rows.first()?;
+        row.sigma_m.map(|sigma_m| sigma_m * row.measurement.weight.sqrt())
+    }
+
     /// The pairings that occur, in the rig's order.
     pub fn pairings(&self) -> Vec<PairingId> {
         let mut pairings: Vec<_> = self.rows.iter().map(|row| row.pairing).collect();

@@ -80,6 +80,12 @@ pub struct Calibration {
     pub when: String,
     /// The program and its version.
     pub by: String,
+    /// What the fit was found to be; `None` in files of versions that did not say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<CalibrationVerdict>,
+    /// What weighs on it, in whole sentences.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<String>,
     /// The robot that the fit began with.
     pub from_robot: String,
     /// Files of poses.
@@ -95,6 +101,26 @@ pub struct Calibration {
     /// RMS residual of poses left out of the fit (cross-validation), millimetres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out_rms_mm: Option<f64>,
+}
+
+/// What the fit behind a robot's file was found to be. What is worse than these is not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CalibrationVerdict {
+    /// Proven, and nothing stands against it.
+    Calibrated,
+    /// Good, but something weighs on it: see the reasons.
+    Reserved,
+}
+
+impl CalibrationVerdict {
+    /// The word in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Calibrated => "calibrated",
+            Self::Reserved => "reserved",
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -239,6 +265,21 @@ impl Robot {
         let encoders: Vec<_> = self.encoders.iter().filter_map(|facts| facts.encoder).collect();
         let couplings: Vec<_> = self.encoders.iter().flat_map(|facts| facts.couplings.iter().copied()).collect();
         JointEncoders::new(&encoders, &couplings).map_err(|error: EncoderError| because(error.to_string()))
+    }
+
+    /// What the fit behind this robot was found to be; `None` for a design, and for a file that does not say.
+    pub fn verdict(&self) -> Option<CalibrationVerdict> {
+        self.calibration.as_ref().and_then(|calibration| calibration.verdict)
+    }
+
+    /// What this robot's parameters are, in a few words.
+    pub fn standing(&self) -> &'static str {
+        match (&self.calibration, self.verdict()) {
+            (_, Some(CalibrationVerdict::Calibrated)) => "calibrated",
+            (_, Some(CalibrationVerdict::Reserved)) => "calibrated, with reservations",
+            (Some(_), None) => "fitted, but not found to be calibrated",
+            (None, None) => "design, not calibrated",
+        }
     }
 
     /// The file or built-in that this robot was read from.
@@ -429,6 +470,12 @@ fn calibration_table(calibration: &Calibration) -> Table {
         .set_prefix("\n# The links and joints of this file hold fitted parameters; comments beside them are the design's.\n");
     table.insert("when", value(&calibration.when));
     table.insert("by", value(&calibration.by));
+    if let Some(verdict) = calibration.verdict {
+        table.insert("verdict", value(verdict.name()));
+    }
+    if !calibration.reasons.is_empty() {
+        table.insert("reasons", value(calibration.reasons.iter().collect::<toml_edit::Array>()));
+    }
     table.insert("from_robot", value(&calibration.from_robot));
     table.insert("from_poses", value(calibration.from_poses.iter().collect::<toml_edit::Array>()));
     table.insert("poses", value(calibration.poses as i64));

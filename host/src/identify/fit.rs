@@ -1,6 +1,5 @@
 //! A fit, whole: from a design and a dataset to parameters, how sure they are, and what poses left out say of them.
 
-use std::fmt;
 use std::time::{Duration, Instant};
 
 use ballbar::{Chain, Damping, FreeParameters, Kinematics, Measurement, Parameter, ParameterUnit};
@@ -9,14 +8,13 @@ use thiserror::Error;
 
 use super::hold::{Held, Hold, HoldError};
 use super::identifiability::Identifiability;
-use super::lm::{LmOptions, Solution, Status, solve};
+use super::lm::{LmOptions, Solution, solve};
 use super::postures::postures;
 use super::residuals::{
-    Outlier, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
+    ALIKE, Outlier, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
 };
 use super::uncertainty::Uncertainty;
-use crate::files::{Calibration, Dataset, Robot};
-use crate::units::mm_from_m;
+use crate::files::{Dataset, Robot};
 
 /// What to hold, and how to step.
 #[derive(Clone, Debug, Default)]
@@ -62,32 +60,14 @@ pub struct FittedParameter {
     pub held: Option<Held>,
 }
 
-/// Why a fit is not worth keeping.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Objection {
-    /// The solve did not end at a minimum.
-    NoMinimum(Status),
-    /// There are too few poses to leave some out.
-    Unproven,
-    /// Poses left out are predicted worse than by the design.
-    NoBetter,
-}
-
-impl fmt::Display for Objection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NoMinimum(status) => status.explanation(),
-            Self::Unproven => "there are too few poses to leave some out and prove the result on them",
-            Self::NoBetter => "poses left out of the fit are predicted no better than by the design",
-        })
-    }
-}
-
 /// How well a fit to some poses predicts the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossValidation {
     /// Parts that were left out in turn.
     pub folds: usize,
+    /// Whether each part was measured in one go: where residuals follow one another, what was measured just before and after a pose
+    /// shares its errors and proves nothing of it.
+    pub in_blocks: bool,
     /// Weighted RMS residual of the poses while they were left out, metres.
     pub rms_m: f64,
 }
@@ -133,34 +113,6 @@ impl Fit {
     pub fn free_parameters(&self) -> usize {
         self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
     }
-
-    /// Why the result is not worth keeping; `None` when it is: a minimum was reached, and poses left out of the fit are
-    /// predicted better by it than by the design, or nothing had to be changed.
-    pub fn objection(&self) -> Option<Objection> {
-        match (self.solution.status, self.cross_validation) {
-            (Status::AlreadyOptimal, _) => None,
-            (status, _) if !status.is_minimum() => Some(Objection::NoMinimum(status)),
-            (_, None) => Some(Objection::Unproven),
-            (_, Some(left_out)) if left_out.rms_m > self.initial.rms_m => Some(Objection::NoBetter),
-            _ => None,
-        }
-    }
-
-    /// What a calibrated robot's file says of this fit, dated now.
-    pub fn calibration(&self, robot: &Robot, dataset: &Dataset) -> Calibration {
-        let now = jiff::Timestamp::now();
-        Calibration {
-            when: now.round(jiff::Unit::Second).unwrap_or(now).to_string(),
-            by: concat!("host-cal ", env!("CARGO_PKG_VERSION")).to_owned(),
-            from_robot: robot.source_name().to_owned(),
-            from_poses: dataset.files.clone(),
-            poses: dataset.rows.len(),
-            free_parameters: self.free_parameters(),
-            rms_initial_mm: mm_from_m(self.initial.rms_m),
-            rms_mm: mm_from_m(self.fitted.rms_m),
-            held_out_rms_mm: self.cross_validation.map(|held_out| mm_from_m(held_out.rms_m)),
-        }
-    }
 }
 
 /// Fits the robot's parameters to the dataset.
@@ -187,7 +139,9 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
     let before = residuals(design, dataset);
     let after = residuals(&solution.chain, dataset);
     let base_alone = base_alone(design, dataset, &measurements, &reasons, &lm);
-    let (cross_validation, left_out) = cross_validate(design, &measurements, &free, &lm).unzip();
+    let neighbour_correlation = neighbour_correlation(dataset, &after);
+    let in_blocks = neighbour_correlation.is_some_and(|correlation| correlation > ALIKE);
+    let (cross_validation, left_out) = cross_validate(design, &measurements, &free, &lm, in_blocks).unzip();
     Ok(Fit {
         solve_time,
         identifiability,
@@ -197,7 +151,7 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
         initial_by_pairing: by_pairing(dataset, &before),
         fitted_by_pairing: by_pairing(dataset, &after),
         outliers: outliers(dataset, &after),
-        neighbour_correlation: neighbour_correlation(dataset, &after),
+        neighbour_correlation,
         cross_validation,
         left_out: left_out.unwrap_or_default(),
         base_alone,
@@ -245,22 +199,25 @@ fn fitted_parameters(
 }
 
 /// Cross-validation in five parts, or in more where five would leave too few poses to fit; `None` where any would. Rows of the
-/// same posture stay together: lengths to other spheres of one pose are no independent proof of it.
+/// same posture stay together: lengths to other spheres of one pose are no independent proof of it. Parts are taken in turn, or in
+/// blocks of what was measured in one go.
 fn cross_validate(
     design: &Chain<f64>,
     measurements: &[Measurement<f64>],
     free: &FreeParameters,
     lm: &LmOptions,
+    in_blocks: bool,
 ) -> Option<(CrossValidation, Vec<Residual>)> {
     let group_of_row = postures(design.joint_kinds(), measurements.iter().map(|measurement| &measurement.q));
     let groups = group_of_row.iter().max().map_or(0, |last| last + 1);
-    let kept = |folds: usize, fold: usize| group_of_row.iter().filter(|&group| group % folds != fold).count();
+    let fold_of = |group: usize, folds: usize| if in_blocks { group * folds / groups } else { group % folds };
+    let kept = |folds: usize, fold: usize| group_of_row.iter().filter(|&&group| fold_of(group, folds) != fold).count();
     let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| kept(folds, fold) > free.len());
     let folds = [5, 10, groups].into_iter().find(enough)?;
 
     let mut left_out = vec![Residual { value_m: 0.0, weight: 1.0 }; measurements.len()];
     for fold in 0..folds {
-        let is_left_out = |row: usize| group_of_row[row] % folds == fold;
+        let is_left_out = |row: usize| fold_of(group_of_row[row], folds) == fold;
         let kept: Vec<_> = (0..measurements.len()).filter(|&row| !is_left_out(row)).map(|row| measurements[row]).collect();
         let kinematics = Kinematics::new(&solve(design, &kept, free, lm).chain);
         for row in (0..measurements.len()).filter(|&row| is_left_out(row)) {
@@ -269,5 +226,5 @@ fn cross_validate(
         }
     }
     let squares: f64 = left_out.iter().map(|f| f.weight * f.value_m.powi(2)).sum();
-    Some((CrossValidation { folds, rms_m: (squares / measurements.len() as f64).sqrt() }, left_out))
+    Some((CrossValidation { folds, in_blocks, rms_m: (squares / measurements.len() as f64).sqrt() }, left_out))
 }

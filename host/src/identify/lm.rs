@@ -78,7 +78,7 @@ impl Status {
                 "no parameter is free, or no length depends on a free one; measure other poses, look for wrong rows, or hold fewer parameters"
             }
             Self::IterationLimit => {
-                "the steps were used up before a minimum was reached; hold more parameters (--hold auto chooses them)"
+                "as many steps as may be tried were, before a minimum was reached; hold more parameters, or only those that the poses do not tell"
             }
             Self::NotFinite => "the residuals at the start are not finite numbers",
         }
@@ -92,10 +92,15 @@ pub struct Solution {
     pub status: Status,
     /// The chain with the best parameters seen.
     pub chain: Chain<f64>,
-    /// Steps tried, refused ones included.
-    pub iterations: usize,
-    /// Weighted RMS residual at the start and after each accepted step, metres.
+    /// Weighted RMS residual at the start and after each step, metres.
     pub rms_history_m: Vec<f64>,
+}
+
+impl Solution {
+    /// Steps from the start to where the solve ended. Those that were tried and lowered nothing are not among them.
+    pub fn steps(&self) -> usize {
+        self.rms_history_m.len().saturating_sub(1)
+    }
 }
 
 const GRADIENT_TOLERANCE: f64 = 1e-10;
@@ -157,7 +162,7 @@ impl<'a> Solver<'a> {
 
     fn run(mut self) -> Solution {
         let status = self.iterate();
-        Solution { status, chain: self.chain, iterations: self.iterations, rms_history_m: self.rms_history_m }
+        Solution { status, chain: self.chain, rms_history_m: self.rms_history_m }
     }
 
     fn iterate(&mut self) -> Status {

@@ -25,7 +25,7 @@ mod trend;
 mod uncertainty;
 
 pub use advice::{bound_by_ends, bound_by_pairings, remarks};
-pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, Objection, fit};
+pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, fit};
 pub use hold::{Held, Hold, HoldError};
 pub use identifiability::{Finding, Identifiability, plausible_error};
 pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
@@ -33,8 +33,10 @@ pub use normality::{AndersonDarling, anderson_darling};
 pub use observation::Observation;
 pub use offsets::{Offset, farthest_offset};
 pub use postures::postures;
+pub(crate) use residuals::median;
 pub use residuals::{
-    Outlier, OutlierTest, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers, residuals,
+    ALIKE, Outlier, OutlierTest, PairingResiduals, Residual, ResidualSummary, by_pairing, neighbour_correlation, outliers,
+    residuals,
 };
 pub use spectrum::{RANK_THRESHOLD, Spectrum};
 pub use trend::Trend;

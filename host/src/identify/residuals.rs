@@ -92,6 +92,8 @@ pub struct Outlier {
     pub test: OutlierTest,
 }
 
+/// Neighbours in the order of measurement that are alike beyond this correlation drift together.
+pub const ALIKE: f64 = 0.5;
 /// Residuals beyond this many robust standard deviations stand out: one in 1.7 million of normal ones.
 const OUTLIER_SCORE: f64 = 5.0;
 /// Neighbours on either side, as in Hampel's identifier; the spread is that of all rows, since eleven give a poor one.
@@ -102,7 +104,7 @@ const SMALLEST_SPREAD_M: f64 = 1e-9;
 /// Rows that stand out from all others or from their neighbours of the same pairing, the worst first.
 pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
     let residuals_m: &[f64] = &residuals.iter().map(|f| f.whitened_m()).collect::<Vec<_>>();
-    let stated_m = stated_spread_m(dataset);
+    let stated_m = dataset.stated_sigma_m().unwrap_or_default();
     let middle = median(residuals_m.to_vec());
     let global = scores(&residuals_m.iter().map(|f| Some(f - middle)).collect::<Vec<_>>(), stated_m);
     let local = scores(&deviations_from_neighbours(dataset, residuals_m), stated_m);
@@ -146,12 +148,6 @@ fn deviations_from_neighbours(dataset: &Dataset, residuals_m: &[f64]) -> Vec<Opt
     deviations
 }
 
-/// What `sigma_mm` says the `√w f` scatter by, metres: the same for all rows. 0 where it is not given.
-fn stated_spread_m(dataset: &Dataset) -> f64 {
-    let spread = |row: &PoseRow| row.sigma_m.map_or(0.0, |sigma| sigma * row.measurement.weight.sqrt());
-    dataset.rows.first().map_or(0.0, spread)
-}
-
 /// Deviations in units of their robust spread: 1.4826 times the median of their sizes, which is σ where they are normal, but no
 /// less than what is stated. Rows without a deviation score 0 and do not count.
 fn scores(deviations_m: &[Option<f64>], stated_m: f64) -> Vec<f64> {
@@ -160,7 +156,8 @@ fn scores(deviations_m: &[Option<f64>], stated_m: f64) -> Vec<f64> {
     deviations_m.iter().map(score).collect()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// Median; 0 of none.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     match values.len() {
         0 => 0.0,

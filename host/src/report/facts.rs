@@ -5,13 +5,10 @@ use std::collections::BTreeMap;
 use ballbar::{JointKind, Kinematics, Vector3};
 use nalgebra::DMatrix;
 
-use super::proof::{Proof, ProofKind, proofs};
-use super::verdict::Verdict;
 use super::workspace::Workspace;
+use crate::assess::Assessment;
 use crate::files::{Dataset, PairingId, PoseRow, Rig, Robot};
-use crate::identify::{
-    AndersonDarling, Fit, FittedParameter, Outlier, Residual, ResidualSummary, Status, anderson_darling, residuals,
-};
+use crate::identify::{Fit, FittedParameter, Outlier, Residual, ResidualSummary, residuals};
 
 /// What the facts are computed from.
 #[derive(Clone, Copy, Debug)]
@@ -26,10 +23,8 @@ pub struct Inputs<'a> {
     pub dataset: &'a Dataset,
     /// The fit to them.
     pub fit: &'a Fit,
-    /// Poses that the fit has not seen, and what to call them; none is empty.
-    pub unseen: &'a [(String, &'a Dataset)],
-    /// Why the result is not to be kept, if it is not.
-    pub objection: Option<&'a str>,
+    /// What the fit is worth.
+    pub assessment: &'a Assessment,
     /// What else is to be known, in whole sentences.
     pub remarks: &'a [String],
 }
@@ -119,22 +114,20 @@ pub struct Facts {
     pub before: ResidualSummary,
     /// Residuals of the fitted poses with the fit.
     pub after: ResidualSummary,
-    /// What the fit has not seen: files and poses held out, its own poses left out in turn, then other lengths of fitted postures.
-    pub proofs: Vec<Proof>,
+    /// What the result is called, and what that rests on.
+    pub assessment: Assessment,
     /// Residuals when only where the robot's base stands was fitted.
     pub base_alone: Option<ResidualSummary>,
-    /// When the robot that the fit began with was calibrated, if it was: "before" is no design then.
-    pub calibrated: Option<String>,
     /// All parameters.
     pub parameters: Vec<FittedParameter>,
     /// What the poses can tell.
     pub singular: Singular,
-    /// RMS at the start and after each accepted step, metres.
+    /// RMS at the start and after each step, metres.
     pub rms_history_m: Vec<f64>,
+    /// How many steps the solve took.
+    pub steps: usize,
     /// Why the solve ended.
     pub explanation: &'static str,
-    /// Whether the design was at the minimum already, and nothing was changed.
-    pub is_unchanged: bool,
     /// The most parameters of this robot that any lengths can tell (the paper's eq. 1).
     pub independent: usize,
     /// How many of them the fit told: the rank of the free columns.
@@ -143,16 +136,12 @@ pub struct Facts {
     pub sigma_m: Option<f64>,
     /// Correlation of residuals with the next ones measured.
     pub neighbour_correlation: Option<f64>,
-    /// Whether the whitened residuals look normal; `None` for too few.
-    pub normality: Option<AndersonDarling>,
     /// Rows that stand out: index into `rows`.
     pub outliers: Vec<Outlier>,
     /// Of the free parameters.
     pub correlation: Correlation,
     /// Predicted error of the tool.
     pub workspace: Workspace,
-    /// Why the result is not to be kept.
-    pub objection: Option<String>,
     /// What else is to be known.
     pub remarks: Vec<String>,
 }
@@ -164,7 +153,6 @@ impl Facts {
         let pairings = dataset.pairings();
         let before = residuals(&robot.chain, dataset);
         let rows = rows(inputs, &pairings, &before);
-        let whitened_m: Vec<f64> = rows.iter().map(|row| row.whitened_m).collect();
         Self {
             robot: robot.name.clone(),
             robot_file: robot.source_name().to_owned(),
@@ -175,26 +163,23 @@ impl Facts {
             pairings: pairings.iter().map(|&id| (rig.pairing_name(id), id.chuck)).collect(),
             before: fit.initial,
             after: fit.fitted,
-            proofs: proofs(inputs, before),
+            assessment: inputs.assessment.clone(),
             base_alone: fit.base_alone,
-            calibrated: robot.calibration.as_ref().map(|calibration| calibration.when.clone()),
             parameters: fit.parameters.clone(),
             singular: Singular {
                 values: fit.identifiability.spectrum.singular_values.clone(),
                 rank: fit.identifiability.spectrum.rank,
             },
             rms_history_m: fit.solution.rms_history_m.clone(),
+            steps: fit.solution.steps(),
             explanation: fit.solution.status.explanation(),
-            is_unchanged: fit.solution.status == Status::AlreadyOptimal,
             independent: robot.chain.independent_parameters(),
             told: fit.uncertainty.spectrum.rank,
             sigma_m: fit.uncertainty.sigma_m,
             neighbour_correlation: fit.neighbour_correlation,
-            normality: anderson_darling(&whitened_m),
             outliers: fit.outliers.clone(),
             correlation: correlation(fit),
             workspace: Workspace::new(robot, fit),
-            objection: inputs.objection.map(str::to_owned),
             remarks: inputs.remarks.to_vec(),
             shells: shells(&rows, &pairings),
             rows,
@@ -206,21 +191,9 @@ impl Facts {
         self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
     }
 
-    /// The proof that says the least good of the fit: the one to go by.
-    pub fn decisive_proof(&self) -> Option<&Proof> {
-        let unseen = self.proofs.iter().filter(|proof| proof.kind != ProofKind::SamePostures);
-        let worst = unseen.max_by(|a, b| a.after_summary().rms_m.total_cmp(&b.after_summary().rms_m));
-        worst.or(self.proofs.first())
-    }
-
     /// Whether the files say that some lengths are surer than others.
     pub fn is_weighted(&self) -> bool {
         self.rows.iter().any(|row| row.whitened_m != row.after_m)
-    }
-
-    /// What the result is called, and with what reserve.
-    pub fn verdict(&self) -> Verdict {
-        Verdict::new(self)
     }
 }
 

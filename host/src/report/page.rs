@@ -6,9 +6,8 @@ use serde_json::json;
 
 use super::facts::{Facts, RowFact};
 use super::figures::{CHUCKS, Figure, dark_rules, drawn, hex, wires_m};
-use super::proof::Proof;
 use super::tables::{largest, parameters};
-use super::verdict::{Answer, Verdict};
+use crate::assess::{Answer, Assessment, Proof, ProofKind};
 use crate::text::visible;
 use crate::units::{fixed, mm_from_m};
 
@@ -45,7 +44,7 @@ pub fn html(facts: &Facts, figures: &[Figure], when: &str) -> String {
 }
 
 fn first_screen(facts: &Facts, when: &str) -> Markup {
-    let Verdict { answer, reasons, not_said } = facts.verdict();
+    let Assessment { answer, reasons, .. } = &facts.assessment;
     let colour = match answer {
         Answer::Calibrated | Answer::Unchanged => "good",
         Answer::Reserved => "reserved",
@@ -55,7 +54,7 @@ fn first_screen(facts: &Facts, when: &str) -> Markup {
         header class=(colour) {
             p.robot { (facts.robot) }
             h1 { (answer.words()) }
-            @for reason in &reasons { p.reason { (reason) } }
+            @for reason in reasons { p.reason { (reason) } }
             (numbers(facts))
             div.words {
                 div {
@@ -64,7 +63,7 @@ fn first_screen(facts: &Facts, when: &str) -> Markup {
                 }
                 div {
                     h2 { "What this does not say" }
-                    ul { @for limit in &not_said { li { (limit) } } }
+                    ul { @for limit in not_said(facts) { li { (limit) } } }
                 }
             }
             p.small {
@@ -80,7 +79,7 @@ fn numbers(facts: &Facts) -> Markup {
     let mm = |m: f64| format!("{} mm", fixed(mm_from_m(m), 3));
     html! {
         dl {
-            @if let Some(proof) = facts.decisive_proof() {
+            @if let Some(proof) = facts.assessment.decisive_proof() {
                 @let (before, after) = (proof.before_summary(), proof.after_summary());
                 (big("lengths not seen: RMS before", &mm(before.rms_m)))
                 (big("RMS after", &mm(after.rms_m)))
@@ -120,8 +119,8 @@ fn grounds(facts: &Facts) -> Vec<Markup> {
         }
     };
     let mut grounds = vec![told];
-    grounds.extend(facts.proofs.iter().map(proof));
-    if facts.proofs.is_empty() {
+    grounds.extend(facts.assessment.proofs.iter().map(proof));
+    if facts.assessment.proofs.is_empty() {
         grounds.push(html! { "Nothing was left out to prove the result on." });
     }
     grounds.push(fitted);
@@ -134,6 +133,19 @@ fn grounds(facts: &Facts) -> Vec<Markup> {
     }
     grounds.extend(facts.remarks.iter().map(|remark| html! { (remark) }));
     grounds
+}
+
+/// What nobody may conclude from the page.
+fn not_said(facts: &Facts) -> Vec<&'static str> {
+    let others = "That other lengths were tried: the proof is by parts of the same poses, left out in turn. Poses of another day or bar \
+                  (--validate) are a better one.";
+    let is_apart = facts.assessment.proofs.iter().any(|proof| proof.kind == ProofKind::Apart);
+    let always = [
+        "That lengths and places are true: an error common to all lengths (the bar's zero and scale) or of the coordinates in the \
+         rig's file goes into the parameters and shows in no residual.",
+        "How the robot does under another load or temperature, how well it repeats, and for how long the result holds.",
+    ];
+    (!is_apart).then_some(others).into_iter().chain(always).collect()
 }
 
 fn big(what: &str, number: &str) -> Markup {

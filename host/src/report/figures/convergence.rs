@@ -34,8 +34,8 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
         "A minimum shows as a fall with a flat end: from {} to {} mm in {} {}; the solve stopped there because {}.",
         fixed(first, 4),
         fixed(last, 4),
-        rms_mm.len() - 1,
-        if rms_mm.len() == 2 { "step" } else { "steps" },
+        facts.steps,
+        if facts.steps == 1 { "step" } else { "steps" },
         facts.explanation
     );
     Ok(FRAME.drawn(svg, data, sentence))

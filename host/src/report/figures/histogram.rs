@@ -49,7 +49,7 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     for (bin, n) in counts.iter().enumerate() {
         data.row([number(edge(bin)), number(edge(bin + 1)), n.to_string(), number(normal(edge(bin) + width / 2.0))]);
     }
-    let test = match facts.normality {
+    let test = match facts.assessment.normality {
         None => "too few for a test of that".to_owned(),
         Some(test) if test.p_value < DOUBTFUL => format!(
             "the Anderson-Darling test says they do not (p {}), so look for outliers, drift and what the model does not hold",

@@ -15,7 +15,7 @@ const HALF_WIDTH: f64 = 0.36;
 pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let names: Vec<String> = facts.pairings.iter().map(|(name, _)| name.clone()).collect();
     let rows_of = |pairing: usize| (0..facts.rows.len()).filter(move |&row| facts.rows[row].pairing == pairing);
-    let summaries: Vec<ResidualSummary> = facts.residuals_by_pairing().iter().map(|of| ResidualSummary::new(of)).collect();
+    let summaries: Vec<ResidualSummary> = facts.assessment.by_pairing.iter().map(|of| ResidualSummary::new(of)).collect();
     let drawn = drawn(facts);
     let svg = draw(FRAME.name, (WIDTH, HEIGHT), |area| {
         let x = Axis { title: "pairing, chuck:sphere", range: -0.5..names.len() as f64 - 0.5, labels: Labels::Names(&names) };
@@ -36,7 +36,8 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
         data.row([name.clone(), summary.count.to_string(), mean, rms]);
     }
     let judged = facts
-        .farthest_offset()
+        .assessment
+        .farthest_offset
         .map_or_else(|| "there are too few lengths to judge the means".to_owned(), |offset| judgement(&names, offset));
     let sentence = format!("Each pairing in the order of measurement, its mean as a line: {judged}.{}", drawn_words(facts));
     Ok(FRAME.drawn(svg, data, sentence))

@@ -12,7 +12,7 @@ const FRAME: Frame = Frame { name: "held-out", title: "Error on lengths that the
 const SMALLEST_MM: f64 = 1e-4;
 
 pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
-    let Some(proof) = facts.decisive_proof() else {
+    let Some(proof) = facts.assessment.decisive_proof() else {
         return Ok(FRAME.missing("Not drawn: no lengths were kept from the fit, and there are too few to leave some out in turn. Measure more, or give others with --validate."));
     };
     let (before_mm, after_mm) = (sorted_mm(&proof.before), sorted_mm(&proof.after));

@@ -4,8 +4,8 @@ use super::canvas::{AFTER, Axis, CURVE, HEIGHT, Labels, WIDTH, about_zero, chart
 use super::table::{Table, number};
 use super::thin::{drawn, drawn_words};
 use super::{Figure, FigureError, Frame};
+use crate::identify::ALIKE;
 use crate::report::facts::Facts;
-use crate::report::verdict::ALIKE;
 use crate::units::{fixed, mm_from_m};
 
 const FRAME: Frame = Frame { name: "time", title: "Residuals in time", wide: false };
@@ -14,9 +14,9 @@ const WINDOW: usize = 25;
 const SMALLEST_WINDOW: usize = 3;
 
 pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
-    let is_timed = facts.is_timed();
+    let order = &facts.assessment.order;
     let residuals_mm = facts.rows.iter().map(|row| mm_from_m(row.after_m));
-    let points: Vec<(f64, f64)> = facts.places().into_iter().zip(residuals_mm).collect();
+    let points: Vec<(f64, f64)> = order.places.iter().copied().zip(residuals_mm).collect();
     let mean = |window: &[(f64, f64)]| {
         let n = window.len() as f64;
         (window.iter().map(|point| point.0).sum::<f64>() / n, window.iter().map(|point| point.1).sum::<f64>() / n)
@@ -24,14 +24,14 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let window = (points.len() / 4).min(WINDOW);
     let last = points.last().map_or(1.0, |point| point.0).max(1e-3);
     let svg = draw(FRAME.name, (WIDTH, HEIGHT), |area| {
-        let title = if is_timed { "minutes" } else { "in the order of measurement" };
+        let title = if order.is_timed { "minutes" } else { "in the order of measurement" };
         let x = Axis { title, range: 0.0..last, labels: Labels::Numbers };
         let range = about_zero(points.iter().map(|point| point.1));
         let mut chart = chart(area, "", &x, &Axis { title: "residual, mm", range, labels: Labels::Numbers })?;
         dots(&mut chart, AFTER, drawn(facts).into_iter().map(|row| points[row]))?;
         if window < SMALLEST_WINDOW { Ok(()) } else { line(&mut chart, CURVE, points.windows(window).map(mean)) }
     })?;
-    let mut data = Table::new(["row", if is_timed { "minutes" } else { "order" }, "residual_after_mm"]);
+    let mut data = Table::new(["row", if order.is_timed { "minutes" } else { "order" }, "residual_after_mm"]);
     for (row, point) in facts.rows.iter().zip(&points) {
         data.row([row.number.to_string(), number(point.0), number(point.1)]);
     }
@@ -40,8 +40,8 @@ pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     } else {
         format!("The line, a mean over {window} lengths, leaves zero where bar or robot drifts")
     };
-    let order = if is_timed { "" } else { " There are no times to go by, or they start anew." };
-    let sentence = format!("{mean}. {}{}{order}{}", neighbours(facts), change(facts), drawn_words(facts));
+    let untimed = if order.is_timed { "" } else { " There are no times to go by, or they start anew." };
+    let sentence = format!("{mean}. {}{}{untimed}{}", neighbours(facts), change(facts), drawn_words(facts));
     Ok(FRAME.drawn(svg, data, sentence))
 }
 
@@ -64,7 +64,7 @@ fn neighbours(facts: &Facts) -> String {
 
 /// What the slope says.
 fn change(facts: &Facts) -> String {
-    let Some(trend) = facts.trend() else {
+    let Some(trend) = facts.assessment.trend else {
         return " These poses do not tell a steady change from what each pairing is off by.".to_owned();
     };
     let (change, error) = (fixed(mm_from_m(trend.change_m), 3), fixed(mm_from_m(trend.error_m), 3));

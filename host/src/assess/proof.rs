@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use ballbar::Chain;
 
-use super::facts::Inputs;
+use super::assessment::Evidence;
 use crate::files::{Dataset, PoseRow};
 use crate::identify::{Residual, ResidualSummary, postures, residuals};
 
@@ -62,9 +62,7 @@ impl Proof {
 
     /// Whether the fit predicts these lengths worse than the design does, and they are enough to say so.
     pub fn speaks_against(&self) -> bool {
-        self.kind == ProofKind::Apart
-            && self.posture_count() >= FEWEST
-            && self.after_summary().rms_m > self.before_summary().rms_m
+        self.posture_count() >= FEWEST && self.after_summary().rms_m > self.before_summary().rms_m
     }
 
     /// Whether the fit predicts these lengths better than the design by more than twice what chance would do to the difference.
@@ -92,8 +90,8 @@ impl Proof {
 }
 
 /// Of what the fit has not seen, then of its own poses left out in turn, then of other lengths of fitted postures.
-pub(super) fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
-    let Inputs { robot, dataset, fit, .. } = inputs;
+pub(super) fn proofs(evidence: &Evidence<'_>, before: Vec<Residual>) -> Vec<Proof> {
+    let Evidence { robot, dataset, fit, .. } = evidence;
     let kinds = robot.chain.joint_kinds();
     let proof = |name: String, kind: ProofKind, rows: &Dataset| {
         let of = |chain: &Chain<f64>| residuals(chain, rows);
@@ -101,8 +99,8 @@ pub(super) fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
         Proof { name, kind, before: of(&robot.chain), after: of(&fit.solution.chain), postures }
     };
     let (mut apart, mut same) = (Vec::new(), Vec::new());
-    for (name, rows) in inputs.unseen {
-        let seen = in_fitted_postures(inputs, rows);
+    for (name, rows) in evidence.unseen {
+        let seen = in_fitted_postures(evidence, rows);
         let (others, new) = (*rows).clone().split(|row: &PoseRow| seen.contains(&row.number));
         let (all, of_new) = (rows.rows.len(), new.rows.len());
         if of_new > 0 {
@@ -114,7 +112,11 @@ pub(super) fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
         }
     }
     let left_out = fit.cross_validation.map(|proof| Proof {
-        name: format!("the fitted poses, each predicted by a fit without it ({} parts)", proof.folds),
+        name: format!(
+            "the fitted poses, each predicted by a fit without it ({} parts{})",
+            proof.folds,
+            if proof.in_blocks { ", each measured in one go" } else { "" }
+        ),
         kind: ProofKind::LeftOut,
         before,
         after: fit.left_out.clone(),
@@ -124,10 +126,10 @@ pub(super) fn proofs(inputs: &Inputs<'_>, before: Vec<Residual>) -> Vec<Proof> {
 }
 
 /// Numbers of the rows in whose posture a length was fitted.
-fn in_fitted_postures(inputs: &Inputs<'_>, rows: &Dataset) -> HashSet<usize> {
-    let fitted = inputs.dataset.rows.len();
-    let all = inputs.dataset.rows.iter().chain(&rows.rows).map(|row| &row.measurement.q);
-    let numbers = postures(inputs.robot.chain.joint_kinds(), all);
+fn in_fitted_postures(evidence: &Evidence<'_>, rows: &Dataset) -> HashSet<usize> {
+    let fitted = evidence.dataset.rows.len();
+    let all = evidence.dataset.rows.iter().chain(&rows.rows).map(|row| &row.measurement.q);
+    let numbers = postures(evidence.robot.chain.joint_kinds(), all);
     let known: HashSet<usize> = numbers[..fitted].iter().copied().collect();
     let seen = rows.rows.iter().zip(&numbers[fitted..]).filter(|(_, posture)| known.contains(posture));
     seen.map(|(row, _)| row.number).collect()

@@ -1,0 +1,166 @@
+//! The answer, and its grounds in whole sentences.
+
+use super::order::{Order, by_pairing, offset, trend};
+use super::proof::{Proof, ProofKind, proofs};
+use super::refusals::{Judged, Refusal, RmsLimit, judge};
+use super::reservations::reservations;
+use super::suspicion::{Suspicion, suspect};
+use crate::files::{Calibration, CalibrationVerdict, Dataset, Rig, Robot};
+use crate::identify::{AndersonDarling, Fit, Offset, Residual, Trend, anderson_darling, residuals};
+use crate::units::mm_from_m;
+use ballbar::Chain;
+
+/// What a fit is judged from.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence<'a> {
+    /// The robot that the fit began with: its design, as a rule.
+    pub robot: &'a Robot,
+    /// Chucks and spheres.
+    pub rig: &'a Rig,
+    /// The poses that were fitted.
+    pub dataset: &'a Dataset,
+    /// The fit to them.
+    pub fit: &'a Fit,
+    /// Poses that the fit has not seen, and what to call them; none is empty.
+    pub unseen: &'a [(String, &'a Dataset)],
+    /// The largest RMS residual that is believed, metres, in place of the usual one ([`RmsLimit`]).
+    pub max_rms_m: Option<f64>,
+}
+
+/// What the result is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// Lengths left out of the fit are predicted better than by the design, and nothing stands against it.
+    Calibrated,
+    /// The robot's file predicts the lengths as well as a fit to them does: its parameters stay as they are.
+    Unchanged,
+    /// Better than the design, but something in the measurements weighs on the numbers.
+    Reserved,
+    /// Not to be used.
+    NotTrusted,
+}
+
+impl Answer {
+    /// For people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Calibrated => "Calibrated",
+            Self::Unchanged => "Nothing to correct",
+            Self::Reserved => "Better than its design, with reservations",
+            Self::NotTrusted => "Not to be trusted as it is",
+        }
+    }
+
+    /// For machines: `calibrated`, `unchanged`, `reserved`, `not_trusted`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Calibrated => "calibrated",
+            Self::Unchanged => "unchanged",
+            Self::Reserved => "reserved",
+            Self::NotTrusted => "not_trusted",
+        }
+    }
+}
+
+/// The answer and all that it rests on.
+#[derive(Clone, Debug)]
+pub struct Assessment {
+    /// What the result is called.
+    pub answer: Answer,
+    /// Why it is not something better, in whole sentences; none for [`Answer::Calibrated`]. For [`Answer::NotTrusted`] the last one
+    /// says what may be wrong with the measurements, as far as that can be seen.
+    pub reasons: Vec<String>,
+    /// What speaks against the fit; none but for [`Answer::NotTrusted`].
+    pub refusals: Vec<Refusal>,
+    /// The mistake that would explain lengths that do not fit.
+    pub suspicion: Option<Suspicion>,
+    /// How large an RMS residual was believed.
+    pub rms_limit: RmsLimit,
+    /// What the fit has not seen: files and poses held out, its own poses left out in turn, then other lengths of fitted postures.
+    pub proofs: Vec<Proof>,
+    /// The order of measurement.
+    pub order: Order,
+    /// Residuals with the fit by pairing, in the order of `Dataset::pairings`.
+    pub by_pairing: Vec<Vec<Residual>>,
+    /// How they change from the first length to the last, apart from what each pairing is off by; `None` where the poses do not tell.
+    pub trend: Option<Trend>,
+    /// The pairing whose mean residual is the farthest from zero; `None` where the fit leaves no scatter to judge by.
+    pub farthest_offset: Option<Offset>,
+    /// Whether the whitened residuals look normal; `None` for too few.
+    pub normality: Option<AndersonDarling>,
+}
+
+impl Assessment {
+    /// Judges a fit.
+    pub fn new(evidence: &Evidence<'_>) -> Self {
+        let Evidence { robot, dataset, fit, .. } = evidence;
+        let order = Order::new(&dataset.rows.iter().map(|row| row.t_s).collect::<Vec<_>>());
+        let placed = by_pairing(evidence, &order);
+        let whitened_m: Vec<f64> = fit.residuals.iter().map(|residual| residual.whitened_m()).collect();
+        let rms_limit = RmsLimit::new(dataset, evidence.max_rms_m);
+        let mut assessment = Self {
+            answer: Answer::NotTrusted,
+            reasons: Vec::new(),
+            refusals: Vec::new(),
+            suspicion: None,
+            rms_limit,
+            proofs: proofs(evidence, residuals(&robot.chain, dataset)),
+            trend: trend(evidence, &placed),
+            farthest_offset: offset(evidence, &placed),
+            by_pairing: placed.into_iter().map(|group| group.into_iter().map(|(_, residual)| residual).collect()).collect(),
+            normality: anderson_darling(&whitened_m),
+            order,
+        };
+        match judge(evidence, rms_limit, &assessment.proofs) {
+            Judged::Refused(refusals) => {
+                assessment.suspicion = suspect(evidence, &refusals);
+                assessment.reasons.extend(refusals.iter().map(Refusal::to_string));
+                assessment.reasons.extend(assessment.suspicion.as_ref().map(Suspicion::to_string));
+                assessment.refusals = refusals;
+            }
+            Judged::NothingToCorrect => {
+                assessment.answer = Answer::Unchanged;
+                assessment.reasons = reservations(evidence, &assessment);
+            }
+            Judged::Better => {
+                assessment.reasons = reservations(evidence, &assessment);
+                assessment.answer = if assessment.reasons.is_empty() { Answer::Calibrated } else { Answer::Reserved };
+            }
+        }
+        assessment
+    }
+
+    /// The proof that says the least good of the fit: the one to go by.
+    pub fn decisive_proof(&self) -> Option<&Proof> {
+        let unseen = self.proofs.iter().filter(|proof| proof.kind != ProofKind::SamePostures);
+        let worst = unseen.max_by(|a, b| a.after_summary().rms_m.total_cmp(&b.after_summary().rms_m));
+        worst.or(self.proofs.first())
+    }
+
+    /// The parameters worth keeping, and what a robot's file says of them, dated now; `None` where the result is not to be used.
+    pub fn calibration<'a>(&self, evidence: &Evidence<'a>) -> Option<(&'a Chain<f64>, Calibration)> {
+        let Evidence { robot, dataset, fit, .. } = *evidence;
+        let verdict = match self.answer {
+            Answer::NotTrusted => return None,
+            Answer::Calibrated => CalibrationVerdict::Calibrated,
+            Answer::Reserved | Answer::Unchanged => CalibrationVerdict::Reserved,
+        };
+        let is_unchanged = self.answer == Answer::Unchanged;
+        let (chain, kept) = if is_unchanged { (&robot.chain, fit.initial) } else { (&fit.solution.chain, fit.fitted) };
+        let now = jiff::Timestamp::now();
+        let calibration = Calibration {
+            when: now.round(jiff::Unit::Second).unwrap_or(now).to_string(),
+            by: concat!("host-cal ", env!("CARGO_PKG_VERSION")).to_owned(),
+            verdict: Some(verdict),
+            reasons: self.reasons.clone(),
+            from_robot: robot.source_name().to_owned(),
+            from_poses: dataset.files.clone(),
+            poses: dataset.rows.len(),
+            free_parameters: if is_unchanged { 0 } else { fit.free_parameters() },
+            rms_initial_mm: mm_from_m(fit.initial.rms_m),
+            rms_mm: mm_from_m(kept.rms_m),
+            held_out_rms_mm: fit.cross_validation.filter(|_| !is_unchanged).map(|proof| mm_from_m(proof.rms_m)),
+        };
+        Some((chain, calibration))
+    }
+}

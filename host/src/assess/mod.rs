@@ -1,0 +1,26 @@
+//! Is a fit good? The one place that judges it, from facts alone.
+//!
+//! ```text
+//! Evidence (robot, rig, poses, fit, unseen poses) ─┬─▶ proofs ──────▶ refusals ──▶ mistakes (what may be wrong with the data)
+//!                                                  └─▶ order, by pairing ─▶ reservations
+//!                                          Assessment { answer, reasons } ◀── all of it
+//! ```
+//!
+//! `docs/identification.md` says what each answer takes and why.
+
+mod assessment;
+mod mistake;
+mod order;
+mod plausibility;
+mod proof;
+mod refusals;
+mod reservations;
+mod suspicion;
+
+pub use assessment::{Answer, Assessment, Evidence};
+pub use mistake::Mistake;
+pub use order::Order;
+pub use plausibility::Change;
+pub use proof::{Proof, ProofKind};
+pub use refusals::{Refusal, RmsGround, RmsLimit};
+pub use suspicion::Suspicion;

@@ -1,0 +1,163 @@
+//! What may be wrong with measurements that no parameters fit: each conceivable mistake is put right and fitted anew.
+
+use std::fmt;
+
+use ballbar::{Chain, FreeParameters, Kinematics, Measurement};
+
+use super::assessment::Evidence;
+use super::mistake::{Mistake, any_constant, conceivable};
+use super::plausibility::large_changes;
+use super::refusals::Refusal;
+use crate::identify::{Finding, Held, LmOptions, solve};
+use crate::units::{fixed, mm_from_m};
+
+/// What may be wrong. Its text is a whole sentence.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Suspicion {
+    /// With one of these mistakes put right, the lengths fit.
+    Mistakes {
+        /// The likeliest first, with the RMS residual of a fit without it, metres.
+        found: Vec<(Mistake, f64)>,
+        /// The RMS residual of the fit to the measurements as they are, metres.
+        rms_m: f64,
+    },
+    /// The lengths do not depend on the joint values beside them.
+    Unrelated {
+        /// RMS residual, metres.
+        rms_m: f64,
+        /// What lengths of other poses would leave, metres.
+        strange_m: f64,
+    },
+}
+
+impl fmt::Display for Suspicion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mm = |m: f64| fixed(mm_from_m(m), if m < 1e-3 { 3 } else { 1 });
+        match self {
+            Self::Mistakes { found, rms_m } => {
+                f.write_str("Look at this first: ")?;
+                for (i, (mistake, right_m)) in found.iter().enumerate() {
+                    let or = if i > 0 { "; or " } else { "" };
+                    write!(
+                        f,
+                        "{or}{mistake} (put right, a fit leaves an RMS of {} mm instead of {} mm)",
+                        mm(*right_m),
+                        mm(*rms_m)
+                    )?;
+                }
+                f.write_str(".")
+            }
+            Self::Unrelated { rms_m, strange_m } => write!(
+                f,
+                "Look at this first: the lengths seem to have nothing to do with the joint values beside them; a fit leaves {} mm, and lengths in \
+                 any order would leave some {} mm. Were rows shuffled, or are these poses of another robot or rig?",
+                mm(*rms_m),
+                mm(*strange_m)
+            ),
+        }
+    }
+}
+
+/// A mistake explains what it makes so many times smaller.
+const FAR_BETTER: f64 = 3.0;
+/// Mistakes that fit alike within this factor cannot be told from one another.
+const ALIKE: f64 = 1.5;
+/// Below it, fits are alike: a good robot scatters by so much.
+const SCATTER_M: f64 = 0.1e-3;
+/// How many of those are named.
+const NAMED: usize = 2;
+
+/// Looks for the mistake that explains why a fit is refused; `None` where none does.
+pub(super) fn suspect(evidence: &Evidence<'_>, refusals: &[Refusal]) -> Option<Suspicion> {
+    let Evidence { dataset, fit, .. } = evidence;
+    let is_too_large = refusals.iter().any(|refusal| matches!(refusal, Refusal::TooLarge { .. }));
+    let is_implausible = refusals.iter().any(|refusal| matches!(refusal, Refusal::Implausible(_)));
+    let is_beyond_limits = refusals.iter().any(|refusal| matches!(refusal, Refusal::BeyondLimits { .. }));
+    if !(is_too_large || is_implausible || is_beyond_limits) {
+        return None;
+    }
+    let trial = Trial::new(evidence);
+    let as_they_are = dataset.measurements();
+    let (rms_m, is_plausible) = trial.fit(&as_they_are)?;
+    // Where the parameters went too far to be believed, others that fit no better may still be the right ones.
+    let is_far = is_implausible || !is_plausible;
+    let most_m = if is_far { ALIKE * rms_m.max(SCATTER_M) } else { rms_m / FAR_BETTER };
+    let most_m = if is_too_large { most_m.min(fit.fitted.rms_m / FAR_BETTER) } else { most_m };
+    let explains = |mistake: Mistake| {
+        let right = mistake.put_right(evidence);
+        let (rms_m, is_plausible) = trial.fit(&right).filter(|_| right != as_they_are)?;
+        (is_plausible && rms_m < most_m).then_some((mistake, rms_m))
+    };
+    let mut found: Vec<(Mistake, f64)> = conceivable(evidence).into_iter().filter_map(explains).collect();
+    if found.is_empty() {
+        found.extend(any_constant(evidence).and_then(explains));
+    }
+    if let Some(best_m) = found.iter().map(|(_, rms_m)| *rms_m).min_by(f64::total_cmp) {
+        found.retain(|(_, rms_m)| *rms_m <= ALIKE * best_m.max(SCATTER_M));
+        found.truncate(NAMED);
+        return Some(Suspicion::Mistakes { found, rms_m: fit.fitted.rms_m });
+    }
+    let strange_m = strange_m(evidence, &as_they_are);
+    let is_unrelated = is_too_large && !is_beyond_limits && rms_m > UNRELATED * strange_m;
+    is_unrelated.then_some(Suspicion::Unrelated { rms_m: fit.fitted.rms_m, strange_m })
+}
+
+/// A fit that leaves more than this share of what lengths of other poses would leave has learned nothing from the joints.
+const UNRELATED: f64 = 0.5;
+
+/// RMS residual of the design with lengths in any order, but for their mean: `√(var(measured) + var(computed))`, metres.
+fn strange_m(evidence: &Evidence<'_>, measurements: &[Measurement<f64>]) -> f64 {
+    let kinematics = Kinematics::new(&evidence.robot.chain);
+    let measured_m: Vec<f64> = measurements.iter().map(|row| row.length_m).collect();
+    let computed_m: Vec<f64> = measurements.iter().map(|row| kinematics.length(&row.q, &row.pairing)).collect();
+    (variance(&measured_m) + variance(&computed_m)).sqrt()
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count
+}
+
+/// Quick fits, all of the same parameters and rows: those that are independent in these poses, weak ones too. How weak they are was judged
+/// by the residuals of measurements that do not fit, and a fit without them would leave what is wrong with the design.
+struct Trial<'a> {
+    design: &'a Chain<f64>,
+    free: FreeParameters,
+    options: LmOptions,
+}
+
+impl<'a> Trial<'a> {
+    /// A design is a good start: what has not come near in so many steps is not the right one.
+    const STEPS: usize = 20;
+
+    fn new(evidence: &Evidence<'a>) -> Self {
+        let parameters = &evidence.fit.parameters;
+        let is_free = |index: usize| matches!(parameters[index].held, None | Some(Held::Finding(Finding::Weak { .. })));
+        let free = FreeParameters::filtered(parameters.len(), is_free);
+        Self { design: &evidence.robot.chain, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
+    }
+
+    /// The RMS residual of a fit, metres, and whether its parameters are a robot's; `None` where nothing can be fitted.
+    fn fit(&self, measurements: &[Measurement<f64>]) -> Option<(f64, bool)> {
+        let rows = self.rows(measurements);
+        if rows.len() <= self.free.len() {
+            return None;
+        }
+        let fitted = solve(self.design, &rows, &self.free, &self.options).chain;
+        let kinematics = Kinematics::new(&fitted);
+        let weight: f64 = rows.iter().map(|row| row.weight).sum();
+        let squares: f64 = rows.iter().map(|row| row.weight * kinematics.residual(row).powi(2)).sum();
+        let is_plausible = large_changes(self.design, &fitted).iter().all(|change| !change.is_impossible);
+        Some(((squares / weight).sqrt(), is_plausible)).filter(|(rms_m, _)| rms_m.is_finite())
+    }
+
+    /// Enough rows to tell, evenly chosen; all where there are few.
+    fn rows(&self, measurements: &[Measurement<f64>]) -> Vec<Measurement<f64>> {
+        const ENOUGH: usize = 200;
+        const PER_PARAMETER: usize = 6;
+        let count = measurements.len();
+        let most = ENOUGH.max(PER_PARAMETER * self.free.len()).min(count);
+        (0..most).map(|i| measurements[i * count / most]).collect()
+    }
+}

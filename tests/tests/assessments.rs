@@ -1,0 +1,311 @@
+//! Whether a fit is believed: measurements with a mistake in them are refused and the mistake is named, good ones are not accused.
+
+use ballbar::JointKind;
+use ballbar_tests::command::{Run, host_cal_in};
+use ballbar_tests::data::real_data;
+use ballbar_tests::experiment::{Puma, dataset};
+use host_cal::assess::{Answer, Assessment, Evidence, Refusal, RmsGround};
+use host_cal::files::{Dataset, PairingId, PoseRow, Rig, Robot};
+use host_cal::identify::{FitOptions, Hold, fit};
+use host_cal::simulate::Shells;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const SIGMA_M: f64 = 50e-6;
+
+/// A robot that is not quite as designed, and the rig it is measured with.
+struct Cell {
+    design: Robot,
+    truth: Robot,
+    rig: Rig,
+}
+
+impl Cell {
+    fn new(robot: &str, seed: u64) -> Self {
+        let design = Robot::open(robot).expect("built in");
+        let mut truth = design.clone();
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        for (i, value) in truth.chain.parameters_mut().iter_mut().enumerate() {
+            // Millimetres, tenths of a degree, and of a scale what gears are off.
+            let most = match i % 8 {
+                0..3 => 2e-3,
+                3..7 => 3e-3,
+                _ => 3e-4,
+            };
+            *value += rng.random_range(-most..most);
+        }
+        Self { design, truth, rig: Rig::open("triangles").expect("built in") }
+    }
+
+    fn measured(&self, bar_m: f64, seed: u64) -> Dataset {
+        let pairings = self.rig.all_pairings();
+        let shells = Shells {
+            planned_with: &self.design,
+            truth: &self.truth,
+            rig: &self.rig,
+            pairings: &pairings,
+            bar_m,
+            per_pairing: 20,
+            sigma_m: SIGMA_M,
+            seed,
+        };
+        dataset(shells.simulate(|| ()).expect("within reach").into_iter().map(|pose| pose.row).collect())
+    }
+
+    fn assess(&self, dataset: &Dataset) -> Assessment {
+        assess(&self.design, &self.rig, dataset, Hold::default())
+    }
+}
+
+fn assess(robot: &Robot, rig: &Rig, dataset: &Dataset, hold: Hold) -> Assessment {
+    let fit = fit(robot, dataset, &FitOptions { hold, ..FitOptions::default() }).expect("enough poses");
+    Assessment::new(&Evidence { robot, rig, dataset, fit: &fit, unseen: &[], max_rms_m: None })
+}
+
+/// The same poses with something wrong about each.
+fn spoiled(cell: &Cell, dataset: &Dataset, spoil: &dyn Fn(&Cell, &mut PoseRow)) -> Dataset {
+    let mut spoiled = dataset.clone();
+    spoiled.rows.iter_mut().for_each(|row| spoil(cell, row));
+    spoiled
+}
+
+fn rename(cell: &Cell, row: &mut PoseRow, pairing: PairingId) {
+    row.pairing = pairing;
+    row.measurement.pairing = cell.rig.pairing(pairing);
+}
+
+/// Two of three indices exchanged.
+fn exchanged(index: usize, (a, b): (usize, usize)) -> usize {
+    if index == a {
+        b
+    } else if index == b {
+        a
+    } else {
+        index
+    }
+}
+
+type Spoil = Box<dyn Fn(&Cell, &mut PoseRow)>;
+
+/// Mistakes of all rows alike, and words that name them.
+fn mistakes(joints: &[JointKind]) -> Vec<(String, Spoil)> {
+    let mut mistakes: Vec<(String, Spoil)> = Vec::new();
+    let mut mistake = |words: &str, spoil: Spoil| mistakes.push((words.to_owned(), spoil));
+    for (pair, chucks, spheres) in [((0, 1), "chucks A and B", "spheres 1 and 2"), ((1, 2), "chucks B and C", "spheres 2 and 3")]
+    {
+        mistake(
+            &format!("{chucks} look exchanged"),
+            Box::new(move |cell, row| {
+                let PairingId { chuck, sphere } = row.pairing;
+                rename(cell, row, PairingId { chuck: exchanged(chuck, pair), sphere });
+            }),
+        );
+        mistake(
+            &format!("{spheres} look exchanged"),
+            Box::new(move |cell, row| {
+                let PairingId { chuck, sphere } = row.pairing;
+                rename(cell, row, PairingId { chuck, sphere: exchanged(sphere, pair) });
+            }),
+        );
+    }
+    mistake(
+        "chucks A, B and C look exchanged",
+        Box::new(|cell, row| {
+            let PairingId { chuck, sphere } = row.pairing;
+            rename(cell, row, PairingId { chuck: (chuck + 1) % 3, sphere });
+        }),
+    );
+    for joint in [0, 1, 3] {
+        mistake(
+            &format!("joint {} looks as if it were counted with the wrong sign", joint + 1),
+            Box::new(move |_, row| row.measurement.q.as_array_mut()[joint] *= -1.0),
+        );
+    }
+    for (a, b) in [(0, 1), (1, 4), (4, 5)].into_iter().filter(|&(a, b)| joints[a] == joints[b]) {
+        mistake(
+            &format!("joints {} and {} look exchanged", a + 1, b + 1),
+            Box::new(move |_, row| row.measurement.q.as_array_mut().swap(a, b)),
+        );
+    }
+    for (unit, mm) in [("metres", 1000.0), ("inches", 25.4), ("centimetres", 10.0)] {
+        mistake(&format!("lengths look like {unit}"), Box::new(move |_, row| row.measurement.length_m /= mm));
+    }
+    let kinds = joints.to_vec();
+    mistake(
+        "look like radians where degrees",
+        Box::new(move |_, row| {
+            let turns = row.measurement.q.as_array_mut().iter_mut().zip(&kinds).filter(|(_, kind)| **kind == JointKind::Revolute);
+            turns.for_each(|(q, _)| *q = q.to_radians());
+        }),
+    );
+    mistake(
+        "460 mm too short: the bar's nominal length is missing",
+        Box::new(|_, row| {
+            row.measurement.length_m -= 0.46;
+            row.bar_m = None;
+        }),
+    );
+    mistake("150 mm too long: another rod", Box::new(|_, row| row.measurement.length_m += 0.15));
+    mistakes
+}
+
+#[test]
+fn mistakes_are_refused_and_named_on_several_robots() {
+    for (robot, seed) in [("puma560", 3), ("ur5e", 4), ("stanford", 5)] {
+        let cell = Cell::new(robot, seed);
+        let good = cell.measured(0.46, seed);
+        assert_eq!(cell.assess(&good).answer, Answer::Calibrated, "{robot}: {:?}", cell.assess(&good).reasons);
+        for (words, spoil) in mistakes(cell.design.chain.joint_kinds()) {
+            let told = cell.assess(&spoiled(&cell, &good, &spoil));
+            assert_eq!(told.answer, Answer::NotTrusted, "{robot}, {words}: {:?}", told.reasons);
+            let last = told.reasons.last().expect("a reason");
+            assert!(last.contains(&words), "{robot}, {words}: {last}");
+        }
+    }
+}
+
+#[test]
+fn rows_that_are_shuffled_or_shifted_are_told_apart() {
+    for (robot, seed) in [("puma560", 3), ("ur5e", 4)] {
+        let cell = Cell::new(robot, seed);
+        let good = cell.measured(0.46, seed);
+        let lengths = |order: &dyn Fn(usize) -> usize| {
+            let mut other = good.clone();
+            let count = good.rows.len();
+            other.rows.iter_mut().enumerate().for_each(|(i, row)| {
+                row.measurement.length_m = good.rows[order(i) % count].measurement.length_m;
+            });
+            cell.assess(&other)
+        };
+        // 180 rows: 7 and 180 have no common factor.
+        let shuffled = lengths(&|i| 7 * i + 50);
+        assert_eq!(shuffled.answer, Answer::NotTrusted);
+        assert!(shuffled.reasons.last().unwrap().contains("Were rows shuffled"), "{robot}: {:?}", shuffled.reasons);
+        for (by, which) in [(1, "previous"), (179, "next")] {
+            let shifted = lengths(&|i| i + by);
+            assert_eq!(shifted.answer, Answer::NotTrusted);
+            assert!(shifted.reasons.last().unwrap().contains(which), "{robot}: {:?}", shifted.reasons);
+        }
+    }
+}
+
+#[test]
+fn joints_far_beyond_their_limits_are_never_calibrated_though_the_lengths_fit() {
+    let cell = Cell::new("puma560", 3);
+    let good = cell.measured(0.46, 3);
+    // Whole turns, up to what a scale's error lets pass: the lengths are those of the same pose.
+    let wound = |every: usize| {
+        let mut wound = good.clone();
+        for row in wound.rows.iter_mut().step_by(every) {
+            row.measurement.q.as_array_mut()[5] +=
+                std::f64::consts::TAU * if row.measurement.q.as_array()[5] > 0.0 { 1.0 } else { -1.0 };
+        }
+        cell.assess(&wound)
+    };
+    let all = wound(1);
+    assert_eq!(all.answer, Answer::NotTrusted);
+    assert!(
+        all.refusals.iter().any(|refusal| matches!(refusal, Refusal::BeyondLimits { rows: 180, of: 180, joint: 6, .. })),
+        "{all:?}"
+    );
+    let one = wound(1000);
+    assert_ne!(one.answer, Answer::Calibrated);
+    assert!(one.reasons.join(" ").contains("1 of 180 poses have joints far beyond their limits"), "{:?}", one.reasons);
+}
+
+#[test]
+fn changes_that_no_robot_has_are_refused_and_those_of_a_base_set_down_elsewhere_are_a_reservation() {
+    let mut cell = Cell::new("puma560", 3);
+    let good = cell.measured(0.46, 3);
+    let with_base = |cell: &mut Cell, x_m: f64, alpha_rad: f64| {
+        let mut design = cell.design.clone();
+        design.chain.parameters_mut()[0] += x_m;
+        design.chain.parameters_mut()[3] += alpha_rad;
+        assess(&design, &cell.rig, &good, Hold::default())
+    };
+    let near = with_base(&mut cell, 0.2, 0.0);
+    assert_eq!(near.answer, Answer::Reserved, "{:?}", near.reasons);
+    assert!(near.reasons.join(" ").contains("link 1, where the robot stands, by 20"), "{:?}", near.reasons);
+
+    // An arm of another length: the fit finds it, and does not believe it.
+    let mut other_arm = cell.design.clone();
+    other_arm.chain.parameters_mut()[16] += 0.15;
+    let other = assess(&other_arm, &cell.rig, &good, Hold::default());
+    assert_eq!(other.answer, Answer::NotTrusted, "{:?}", other.reasons);
+    assert!(other.reasons.join(" ").contains("no such robot exists"), "{:?}", other.reasons);
+}
+
+#[test]
+fn a_robot_that_is_right_already_is_kept_as_it_is() {
+    let puma = Puma::default();
+    for (per_pairing, sigma_m, hold) in [(20, 84e-6, Hold::default()), (5, 0.5e-3, Hold::paper())] {
+        let mut robot = puma.design.clone();
+        robot.chain = puma.truth.chain.clone();
+        let poses = puma.shells(0.46, per_pairing, sigma_m, 8);
+        let fitted = fit(&robot, &poses, &FitOptions { hold, ..FitOptions::default() }).expect("enough poses");
+        let (rig, robot) = (&puma.rig, &robot);
+        let evidence = Evidence { robot, rig, dataset: &poses, fit: &fitted, unseen: &[], max_rms_m: None };
+        let told = Assessment::new(&evidence);
+        assert_eq!(told.answer, Answer::Unchanged, "{:?}", told.reasons);
+        let (chain, calibration) = told.calibration(&evidence).expect("nothing against it");
+        assert_eq!(chain, &robot.chain, "what a fit to noise would change is not written");
+        assert_eq!(calibration.rms_mm, calibration.rms_initial_mm);
+        assert!(calibration.reasons[0].contains("as well as a fit"), "{calibration:?}");
+    }
+}
+
+#[test]
+fn the_rms_that_is_believed_is_stated_by_the_poses_or_asked_for() {
+    let puma = Puma::default();
+    let assess_with = |sigma_m: f64, stated_m: Option<f64>, max_rms_m: Option<f64>| {
+        let mut dataset = puma.shells(0.46, 20, sigma_m, 3);
+        dataset.rows.iter_mut().for_each(|row| row.sigma_m = stated_m);
+        let fit = fit(&puma.design, &dataset, &FitOptions::default()).expect("enough poses");
+        let (robot, rig) = (&puma.design, &puma.rig);
+        Assessment::new(&Evidence { robot, rig, dataset: &dataset, fit: &fit, unseen: &[], max_rms_m })
+    };
+    let is_too_large = |told: &Assessment| told.refusals.iter().any(|refusal| matches!(refusal, Refusal::TooLarge { .. }));
+    let cases = [
+        (2e-3, None, None, RmsGround::Usual, true),
+        (0.5e-3, None, None, RmsGround::Usual, false),
+        (0.5e-3, Some(20e-6), None, RmsGround::StatedNoise, true),
+        (0.5e-3, Some(100e-6), None, RmsGround::StatedNoise, false),
+        (2e-3, Some(1e-3), None, RmsGround::StatedNoise, false),
+        (2e-3, None, Some(3e-3), RmsGround::Asked, false),
+        (0.5e-3, Some(0.5e-3), Some(0.1e-3), RmsGround::Asked, true),
+    ];
+    for (sigma_m, stated_m, max_rms_m, ground, expected) in cases {
+        let told = assess_with(sigma_m, stated_m, max_rms_m);
+        assert_eq!((told.rms_limit.ground, is_too_large(&told)), (ground, expected), "{sigma_m} {stated_m:?} {max_rms_m:?}");
+        assert_eq!(told.answer == Answer::NotTrusted, expected, "{:?}", told.reasons);
+    }
+}
+
+/// `fit` and `report` of a file that must not be believed: both say so, and no robot is written.
+fn refused(robot: &str, rig: &str, poses: &str, more: &[&str], words: &str) {
+    let Some(folder) = real_data("cases/wrong_data") else { return };
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| out.path().join(name).display().to_string();
+    let args = ["--robot", robot, "--rig", rig, poses, "--json", "--out"];
+    let run =
+        |command: &str, file: &str| -> Run { host_cal_in(&folder, &[&[command], &args[..], &[&path(file)], more].concat()) };
+    let (fit, page) = (run("fit", "fitted.toml"), run("report", "page.html"));
+    assert_eq!((fit.code, page.code), (1, 1), "{poses}: {}", fit.stdout);
+    assert!(!out.path().join("fitted.toml").exists(), "{poses}");
+    for told in [fit.json(), page.json()] {
+        assert_eq!(told["verdict"], "not_trusted", "{poses}");
+        assert!(told["reasons"].to_string().contains(words), "{poses}: {}", told["reasons"]);
+    }
+}
+
+#[test]
+fn files_that_people_sent_are_refused_with_their_mistake() {
+    refused("design.toml", "triangles", "chucks_exchanged.csv", &[], "look exchanged");
+    refused("design.toml", "triangles", "joints_2_3_exchanged.csv", &[], "joints 2 and 3 look exchanged");
+    refused("design.toml", "triangles", "joint_2_sign.csv", &[], "joint 2 looks as if it were counted with the wrong sign");
+    refused("puma560", "triangles", "puma_shuffled.csv", &[], "Were rows shuffled");
+    refused("puma560", "triangles", "puma_chucks_exchanged.csv", &[], "look exchanged");
+    for hold in ["auto", "paper"] {
+        refused("puma560", "beyond_limits_rig.toml", "beyond_limits.csv", &["--hold", hold], "joints far beyond their limits");
+    }
+}
