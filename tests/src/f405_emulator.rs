@@ -187,6 +187,11 @@ impl Bench for F405Board {
 
 impl Drop for F405Board {
     fn drop(&mut self) {
+        // A host that got no answer is only what came of it.
+        let is_running = self.child.try_wait().is_ok_and(|exit| exit.is_none());
+        if std::thread::panicking() && is_running && !self.commands.is_poisoned() {
+            eprintln!("violations:\n{}", self.report().violations.join("\n"));
+        }
         // It may have ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
