@@ -15,6 +15,7 @@
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
 //! | [`report`] | a calibration as a page for people: facts, figures, HTML |
+//! | [`deadline`] | how long a whole answer may take |
 //! | `platform` | what differs between operating systems |
 //! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
 //!
@@ -24,6 +25,7 @@
 pub mod board;
 pub mod cmd;
 pub mod collect;
+pub mod deadline;
 pub mod export;
 pub mod files;
 pub mod identify;

@@ -5,6 +5,7 @@
 
 mod builtin;
 mod csv_rows;
+mod limits;
 mod numbers;
 mod plan_rows;
 mod poses;
@@ -19,6 +20,7 @@ mod urdf;
 mod write;
 
 pub use builtin::{RIGS, ROBOTS};
+pub use limits::BeyondLimits;
 pub use plan_rows::{BarAt, PlanRow, RowKind, RowMargins, read_plan, write_plan};
 pub use poses::{Dataset, Motion, PoseRow, RowWarning, pose_header, pose_record, write_poses};
 pub use problem::Problem;
