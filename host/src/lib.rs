@@ -16,6 +16,7 @@
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
 //! | [`report`] | a calibration as a page for people: facts, figures, HTML |
+//! | [`deadline`] | how long a whole answer may take |
 //! | `platform` | what differs between operating systems |
 //! | [`text`] | what comes from outside, as a terminal may show it |
 //! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
@@ -28,6 +29,7 @@ pub mod assess;
 pub mod board;
 pub mod cmd;
 pub mod collect;
+pub mod deadline;
 pub mod export;
 pub mod files;
 pub mod identify;

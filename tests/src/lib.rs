@@ -27,6 +27,8 @@ pub mod scenarios;
 pub mod simulated_cell;
 pub mod solids;
 #[cfg(unix)]
+pub mod tampered_line;
+#[cfg(unix)]
 pub mod terminal;
 pub mod wire_schema;
 pub mod workspace;

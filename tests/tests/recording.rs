@@ -84,6 +84,7 @@ fn frames(session: &Path) -> (usize, usize) {
     while let Some(record) = reader.next_record().expect("readable") {
         match record {
             Record::Message(_) => whole += 1,
+            Record::Refused(reason) => panic!("a message that the board sent is not believed: {reason}"),
             Record::Damaged => damaged += 1,
         }
     }

@@ -1,5 +1,7 @@
 //! Links to robot controllers, against emulated ones that hold to the published syntax and fail when told to.
 
+#[path = "robot_links/dribbling.rs"]
+mod dribbling;
 #[path = "robot_links/ur.rs"]
 mod ur;
 #[cfg(unix)]

@@ -4,6 +4,8 @@ use ballbar::wire::{ProtocolVersion, Refusal};
 use miette::Diagnostic;
 use thiserror::Error;
 
+use super::plausible::Implausible;
+
 /// A serial port that cannot be opened, or is gone.
 #[derive(Debug, Error, Diagnostic)]
 pub enum PortError {
@@ -85,6 +87,27 @@ pub enum BoardError {
         /// Its reason.
         refusal: Refusal,
     },
+    /// The reply cannot be true.
+    #[error("the board answers `{command}` with what cannot be true: {reason}")]
+    #[diagnostic(help(
+        "Is the board sound, are its parameters those of its robot? `host-cal status PORT` shows what it holds; `host-cal apply PORT` stores anew."
+    ))]
+    Implausible {
+        /// The command.
+        command: &'static str,
+        /// What cannot be true.
+        reason: Implausible,
+    },
+    /// It streams more than any board while a request waits for its answer.
+    #[error("{port}: more comes than any board sends, and no answer to what was asked")]
+    #[diagnostic(help("Is it the right port? `host-cal ports` lists the ports."))]
+    Flood {
+        /// The port.
+        port: String,
+    },
+    /// The user wants to end.
+    #[error("ended by Ctrl-C or a signal")]
+    Stopped,
     /// The reply belongs to another command, which no board of this version sends.
     #[error("the board answers `{command}` with something else")]
     WrongAnswer {

@@ -1,17 +1,21 @@
-//! The host's end of the wire: the serial port, requests and their replies, and what the stream lost.
+//! The host's end of the wire: the serial port, requests and their replies, what is believed of a stream and what it lost.
 
 mod errors;
+mod filter;
 mod link;
 mod lvdt_fit;
+mod plausible;
 mod port;
 mod robot_on_board;
 mod tally;
 mod verify;
 
 pub use errors::{BoardError, PortError};
+pub use filter::MessageFilter;
 pub use link::{BoardLink, Frame};
 pub use lvdt_fit::{LvdtFitError, LvdtPoint, check_lvdt_points, fit_lvdt};
+pub use plausible::Implausible;
 pub use port::{BAUD, Port};
 pub use robot_on_board::{NOMINAL_TRAVEL_M, RobotOnBoard, SetError, nominal_lvdt, parameter_set};
-pub use tally::{StreamLosses, StreamTally};
+pub use tally::{Refusals, RefusedMessages, StreamLosses};
 pub use verify::{KinematicsDifference, rms_kinematics, verify_kinematics};

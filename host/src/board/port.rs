@@ -6,10 +6,11 @@ use std::time::Duration;
 use serialport::{SerialPort, SerialPortType};
 
 use super::errors::PortError;
+use crate::deadline::Deadline;
 
 /// Bits a second of the board's link.
 pub const BAUD: u32 = 921_600;
-/// How long a read waits before it says that there is nothing.
+/// How long one read or write waits before it says that nothing came or went.
 const READ_WAIT: Duration = Duration::from_millis(10);
 /// How long a write may take before the port counts as lost.
 const WRITE_WAIT: Duration = Duration::from_secs(2);
@@ -50,7 +51,7 @@ impl Port {
         match self.inner.read(bytes) {
             Ok(0) => Err(self.lost("it was closed at the other end")),
             Ok(count) => Ok(count),
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock) => Ok(0),
+            Err(error) if is_short_wait(&error) => Ok(0),
             Err(error) => Err(self.lost(&error.to_string())),
         }
     }
@@ -58,17 +59,37 @@ impl Port {
     /// Writes all bytes.
     ///
     /// # Errors
-    /// [`PortError::Lost`], also when the line takes nothing for two seconds.
+    /// [`PortError::Lost`], also when the line does not take them within two seconds.
     pub fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        let _ = self.inner.set_timeout(WRITE_WAIT);
-        let written = self.inner.write_all(bytes);
-        let _ = self.inner.set_timeout(READ_WAIT);
-        written.map_err(|error| self.lost(&error.to_string()))
+        self.write_until(bytes, &Deadline::regardless(WRITE_WAIT))
+    }
+
+    /// Writes all bytes before a deadline, and within two seconds.
+    ///
+    /// # Errors
+    /// [`PortError::Lost`], also when the line does not take them by then.
+    pub fn write_until(&mut self, mut bytes: &[u8], deadline: &Deadline) -> Result<(), PortError> {
+        let deadline = deadline.at_most(WRITE_WAIT);
+        while !bytes.is_empty() {
+            match self.inner.write(bytes) {
+                Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
+                Err(error) if is_short_wait(&error) => {}
+                Err(error) => return Err(self.lost(&error.to_string())),
+            }
+            if !bytes.is_empty() && deadline.check().is_err() {
+                return Err(self.lost("it takes no bytes"));
+            }
+        }
+        Ok(())
     }
 
     fn lost(&self, reason: &str) -> PortError {
         PortError::Lost { name: self.name.clone(), reason: reason.to_owned() }
     }
+}
+
+fn is_short_wait(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock)
 }
 
 fn absent(name: &str) -> PortError {

@@ -94,7 +94,11 @@ impl RobotOnBoard {
     /// [`BoardError`].
     pub fn read(link: &mut BoardLink) -> Result<Option<(Self, Vec<u8>)>, BoardError> {
         match link.request_frame(Command::ReadParameters(WhichSet::Active)) {
-            Ok((Answer::Parameters(set), frame)) => Ok(Self::new(set).map(|robot| (robot, frame))),
+            Ok((Answer::Parameters(set), frame)) => {
+                // Parameters that cannot be computed with are not believed, and do not come here.
+                let robot = Self::new(set).ok_or(BoardError::WrongAnswer { command: "read parameters" })?;
+                Ok(Some((robot, frame)))
+            }
             Ok(_) => Err(BoardError::WrongAnswer { command: "read parameters" }),
             Err(BoardError::Refused { refusal: Refusal::NoParameters, .. }) => Ok(None),
             Err(error) => Err(error),

@@ -1,12 +1,15 @@
-//! What of a stream was lost, and where.
+//! What of a stream was lost, and what was not believed.
 
-use ballbar::wire::{Status, Stream};
+use std::fmt;
+
 use serde::Serialize;
+
+use super::plausible::Implausible;
 
 /// Losses of a stream since it was begun to be watched.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StreamLosses {
-    /// Stream messages that arrived.
+    /// Stream messages that arrived and are believed.
     pub messages: u64,
     /// Numbers missing between them.
     pub missing: u64,
@@ -16,6 +19,68 @@ pub struct StreamLosses {
     pub lost_on_line: u64,
     /// Samples that the board's main loop was too slow for.
     pub overruns: u64,
+    /// Messages that arrived whole and are not believed.
+    pub refused: RefusedMessages,
+}
+
+/// Messages that arrived whole and are not believed, by reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RefusedMessages {
+    /// Values of more or fewer encoders or joints than the board has.
+    pub wrong_count: u64,
+    /// A number that is infinite or none.
+    pub not_finite: u64,
+    /// A number that no board measures, or that does not agree with the messages before.
+    pub out_of_range: u64,
+    /// A number or a time before those that came already.
+    pub went_back: u64,
+    /// The message came already; nothing is lost with it.
+    pub repeated: u64,
+}
+
+impl StreamLosses {
+    /// Messages and samples that are lost: missing, or refused and no mere repetition.
+    pub fn lost(&self) -> u64 {
+        self.missing + self.overruns + self.refused.lost()
+    }
+}
+
+impl RefusedMessages {
+    pub(super) fn count(&mut self, reason: Implausible) {
+        *match reason {
+            Implausible::WrongCount { .. } => &mut self.wrong_count,
+            Implausible::NotFinite(_) => &mut self.not_finite,
+            Implausible::OutOfRange(_) | Implausible::Parameters(_) => &mut self.out_of_range,
+            Implausible::WentBack(_) => &mut self.went_back,
+            Implausible::Repeated => &mut self.repeated,
+        } += 1;
+    }
+
+    /// All of them.
+    pub fn all(&self) -> u64 {
+        self.lost() + self.repeated
+    }
+
+    /// Those with which something is lost.
+    pub fn lost(&self) -> u64 {
+        self.wrong_count + self.not_finite + self.out_of_range + self.went_back
+    }
+}
+
+impl fmt::Display for RefusedMessages {
+    /// `3 messages that cannot be true (2 of another number of encoders, 1 that came already)`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parts = [
+            (self.wrong_count, "of another number of encoders"),
+            (self.not_finite, "not finite"),
+            (self.out_of_range, "out of range"),
+            (self.went_back, "that go back"),
+            (self.repeated, "that came already"),
+        ];
+        let named: Vec<String> =
+            parts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+        write!(f, "{} messages that cannot be true ({})", self.all(), named.join(", "))
+    }
 }
 
 impl std::ops::Add for StreamLosses {
@@ -28,59 +93,37 @@ impl std::ops::Add for StreamLosses {
             dropped_by_board: self.dropped_by_board + other.dropped_by_board,
             lost_on_line: self.lost_on_line + other.lost_on_line,
             overruns: self.overruns + other.overruns,
+            refused: self.refused + other.refused,
         }
     }
 }
 
-/// Follows the numbers of a stream.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StreamTally {
-    last: Option<Numbers>,
-    losses: StreamLosses,
-}
+impl std::ops::Add for RefusedMessages {
+    type Output = Self;
 
-#[derive(Clone, Copy, Debug)]
-struct Numbers {
-    sequence: u32,
-    dropped: u32,
-    overruns: u32,
-}
-
-impl StreamTally {
-    /// Takes the next message.
-    pub fn take(&mut self, stream: &Stream) {
-        let now = Numbers { sequence: stream.sequence, dropped: stream.dropped, overruns: stream.overruns };
-        self.losses.messages += 1;
-        if let Some(last) = self.last.replace(now) {
-            self.count(last, now);
+    fn add(self, other: Self) -> Self {
+        Self {
+            wrong_count: self.wrong_count + other.wrong_count,
+            not_finite: self.not_finite + other.not_finite,
+            out_of_range: self.out_of_range + other.out_of_range,
+            went_back: self.went_back + other.went_back,
+            repeated: self.repeated + other.repeated,
         }
     }
+}
 
-    /// Counts what is missing between two messages.
-    fn count(&mut self, last: Numbers, now: Numbers) {
-        let missing = u64::from(now.sequence.wrapping_sub(last.sequence).wrapping_sub(1));
-        let dropped = u64::from(now.dropped.wrapping_sub(last.dropped));
-        self.losses.missing += missing;
-        self.losses.dropped_by_board += dropped.min(missing);
-        self.losses.lost_on_line += missing.saturating_sub(dropped);
-        self.losses.overruns += u64::from(now.overruns.wrapping_sub(last.overruns));
-    }
+/// Says once for each reason that messages are refused; their number is counted elsewhere.
+#[derive(Clone, Debug, Default)]
+pub struct Refusals(Vec<std::mem::Discriminant<Implausible>>);
 
-    /// The stream has ended; `status` was asked for behind it. What is missing behind the last message shows here only.
-    pub fn end(&mut self, status: &Status) {
-        if let Some(last) = self.last.take() {
-            let now = Numbers { sequence: status.stream_messages, dropped: status.dropped, overruns: status.overruns };
-            self.count(last, now);
+impl Refusals {
+    /// What to say, where this reason is new.
+    pub fn note(&mut self, reason: Implausible) -> Option<String> {
+        let kind = std::mem::discriminant(&reason);
+        if self.0.contains(&kind) {
+            return None;
         }
-    }
-
-    /// The board was reset or the port lost: numbers begin anew, and what lies between is not counted.
-    pub fn interrupt(&mut self) {
-        self.last = None;
-    }
-
-    /// What was lost so far.
-    pub fn losses(&self) -> StreamLosses {
-        self.losses
+        self.0.push(kind);
+        Some(format!("a message of the board is not believed: {reason}; others like it are counted"))
     }
 }

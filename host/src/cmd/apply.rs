@@ -117,7 +117,14 @@ fn check_calibrated(robot: &Robot) -> Result<(), ApplyError> {
 pub(super) fn upload(link: &mut BoardLink, robot: &Robot, vectors: usize) -> Result<ApplyReport, CommandError> {
     // A program that was killed may have left a stream running, and storing would stall it.
     link.act(Command::StopStream)?;
-    let old = RobotOnBoard::read(link)?.map(|(old, _)| old);
+    let old = match RobotOnBoard::read(link) {
+        Ok(old) => old.map(|(old, _)| old),
+        Err(BoardError::Implausible { reason, .. }) => {
+            warn(&format!("what the board holds is replaced unseen: {reason}"));
+            None
+        }
+        Err(error) => return Err(error.into()),
+    };
     let lvdt = match &old {
         Some(old) => old.set().lvdt,
         None => {

@@ -170,10 +170,16 @@ impl CollectArgs {
         let guide = self.guide(&mover, &files, &options)?;
         let recorder = self.recorder(&link, &robot, &mover)?;
         let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
-        let board = BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
+        let mut board =
+            BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
 
         let head = vec!["collect".into(), self.port.port.clone(), mover.name(), files.robot.name.clone()];
-        let mut terminal = Terminal::new(self.hand()?, Still::new(head, &files.robot), EndRequest::listen());
+        let mut hand = self.hand()?;
+        let end = EndRequest::listen();
+        board.heed(end.stop_flag());
+        mover.heed(end.stop_flag());
+        hand.heed(end.stop_flag());
+        let mut terminal = Terminal::new(hand, Still::new(head, &files.robot), end);
         let began = Instant::now();
         let mut collector = Collector::new(&cell, ledger, board, &mut terminal, options);
         let ended = match &mut mover {

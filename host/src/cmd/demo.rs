@@ -133,7 +133,7 @@ impl DemoArgs {
         let board = put_on_board(&mut bench, &scene.truth, &Robot::open(&calibrated_path.to_string_lossy())?)?;
         let names = files.iter().map(|(name, ..)| *name).chain([calibrated_name]);
         let names = names.chain([SUMMARY_NAME]).map(|name| self.out.join(name).display().to_string()).collect();
-        let losses = fitted_shells.losses + other_shells.losses;
+        let losses = bench.link.losses();
         let report = DemoReport::new(&scene, &fit, &other_poses, board, losses, names, &self.out);
         self.write_summary(&report.text())?;
         print(&report, self.output.json)?;
@@ -216,7 +216,7 @@ impl Report for DemoReport {
              Fit {}: {} parameters identified.\n\n",
             self.poses,
             self.sigma_mm,
-            match self.losses.missing + self.losses.overruns {
+            match self.losses.lost() {
                 0 => "nothing was lost".to_owned(),
                 lost => format!("{lost} messages were LOST"),
             },

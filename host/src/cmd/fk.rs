@@ -10,7 +10,7 @@ use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn};
 use crate::files::Robot;
 use crate::kinematics::link_angles;
-use crate::units::{ScreenUnit, mm_from_m, tidy};
+use crate::units::{ScreenUnit, mm_from_m};
 
 /// Pose of the tool at given joint values (forward kinematics)
 #[derive(Args)]
@@ -55,7 +55,7 @@ impl FkArgs {
         if self.q.len() != kinds.len() {
             return Err(wrong_count.into());
         }
-        let warnings = beyond_limits(robot, &q);
+        let warnings: Vec<String> = robot.beyond_limits(&q).map(|beyond| beyond.to_string()).collect();
         for warning in &warnings {
             warn(warning);
         }
@@ -69,19 +69,6 @@ impl FkArgs {
             warnings,
         })
     }
-}
-
-/// Joints of an encoder vector beyond their limits.
-fn beyond_limits(robot: &Robot, q: &[f64]) -> Vec<String> {
-    let joints = robot.limits.iter().zip(robot.chain.joint_kinds()).zip(q).enumerate();
-    let beyond = joints.filter(|(_, ((limits, _), q))| !limits.contain(**q));
-    beyond
-        .map(|(i, ((limits, &kind), &q))| {
-            let unit = ScreenUnit::from(kind);
-            let [q, min, max] = [q, limits.min, limits.max].map(|value| tidy(unit.from_si(value)));
-            format!("joint {} at {q} {} is beyond its limits, {min} to {max}", i + 1, unit.name())
-        })
-        .collect()
 }
 
 /// Zero without a sign, and what would be printed as a signed zero.

@@ -123,9 +123,10 @@ fn outcome(summary: &LogSummary) -> Outcome {
 
 /// What a log lacks, in words.
 fn missing(LogSummary { damaged, gaps, losses, .. }: &LogSummary) -> String {
-    let StreamLosses { missing, dropped_by_board, lost_on_line, overruns, .. } = losses;
+    let StreamLosses { missing, dropped_by_board, lost_on_line, overruns, refused, .. } = losses;
+    let refused = if refused.lost() > 0 { format!("; REFUSED: {refused}") } else { String::new() };
     format!(
-        "MISSING: {missing} messages ({dropped_by_board} dropped by the board, {lost_on_line} lost on the line), {overruns} samples by overrun; {damaged} damaged frames, {gaps} times without a port"
+        "MISSING: {missing} messages ({dropped_by_board} dropped by the board, {lost_on_line} lost on the line), {overruns} samples by overrun; {damaged} damaged frames, {gaps} times without a port{refused}"
     )
 }
 

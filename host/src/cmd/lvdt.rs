@@ -1,9 +1,10 @@
 //! `host-cal lvdt`: measure the LVDT's curve from known lengths.
 
 use std::io::{IsTerminal, stdin};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use ballbar::wire::{Answer, Command, Event, Refusal, StreamSelection, ToHost};
+use ballbar::wire::{Answer, Command, Event, Refusal, StreamSelection};
 use ballbar::{LVDT_COEFFICIENTS, SettledPose, StillnessCriteria};
 use clap::Args;
 use miette::Diagnostic;
@@ -12,11 +13,13 @@ use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
 use super::out::{ask, tell};
-use super::outcome::{CommandError, Outcome};
+use super::outcome::{CommandError, INTERRUPTED, Outcome};
 use super::port::{EndRequest, PortArgs};
-use super::report::{Report, print};
+use super::report::{Report, print, warn};
 use super::table::{Columns, fixed};
-use crate::board::{BoardError, BoardLink, LvdtPoint, RobotOnBoard, check_lvdt_points, fit_lvdt};
+use super::typed::typed_lines;
+use crate::board::{BoardError, BoardLink, LvdtPoint, Refusals, RobotOnBoard, StreamLosses, check_lvdt_points, fit_lvdt};
+use crate::deadline::StopFlag;
 use crate::units::{m_from_mm, mm_from_m};
 
 /// Measure the LVDT's curve from known lengths, and store it on the board
@@ -57,8 +60,15 @@ enum LvdtError {
     #[error("ended before all lengths were measured: {found} of {wanted}")]
     #[diagnostic(help("Nothing was changed on the board."))]
     Ended { found: usize, wanted: usize },
+    #[error("the board has stopped streaming")]
+    #[diagnostic(help("Was it started again? Nothing was changed on the board."))]
+    NotStreaming,
 }
 
+/// From one look at the keyboard to the next.
+const LOOK: Duration = Duration::from_millis(50);
+/// After so much silence the board is asked how it is.
+const SILENCE: Duration = Duration::from_secs(1);
 /// How long an arm that moves is waited for.
 const STORE_PATIENCE: Duration = Duration::from_secs(10);
 
@@ -73,6 +83,7 @@ struct LvdtReport {
     coefficients_mm: [f64; LVDT_COEFFICIENTS],
     /// Whether the curve was stored, and why not.
     outcome: &'static str,
+    losses: StreamLosses,
 }
 
 #[derive(Serialize)]
@@ -92,9 +103,13 @@ impl LvdtArgs {
         check_lvdt_points(self.lengths.len(), usize::from(self.degree))?;
         let mut link = self.port.connect()?;
         RobotOnBoard::read(&mut link)?.ok_or(LvdtError::NoParameters)?;
-        let measured = self.measure(&mut link);
+        let end = EndRequest::listen();
+        link.heed(end.stop_flag());
+        let measured = self.measure(&mut link, &end);
         // Whatever came of it, the board is left as it is after its start.
-        let left = link.act(Command::StopStream).and_then(|()| link.act(Command::SetStillness(StillnessCriteria::default())));
+        let left = link.end_stream();
+        link.heed(&StopFlag::default());
+        let left = left.and_then(|_| link.act(Command::SetStillness(StillnessCriteria::default())));
         let poses = measured?;
         left?;
         let point = |(&length_mm, pose): (&f64, &SettledPose)| LvdtPoint {
@@ -129,6 +144,7 @@ impl LvdtArgs {
             code_max: curve.code_max,
             coefficients_mm: curve.coefficients_m.map(|m| mm_from_m(f64::from(m))),
             outcome,
+            losses: link.losses(),
         };
         // What was measured by hand is shown, whatever became of it.
         print(&report, self.output.json)?;
@@ -136,9 +152,16 @@ impl LvdtArgs {
         Ok(if max_abs_mm <= self.tolerance_mm { Outcome::Good } else { Outcome::Doubtful })
     }
 
+    /// Ended before its time, by Ctrl-C or because stdin was closed.
+    fn ended(&self, found: usize, end: &EndRequest) -> CommandError {
+        let error = CommandError::from(LvdtError::Ended { found, wanted: self.lengths.len() });
+        if end.is_made() { CommandError { exit_code: INTERRUPTED, ..error } } else { error }
+    }
+
     /// Takes one settled pose for each length.
-    fn measure(&self, link: &mut BoardLink) -> Result<Vec<SettledPose>, CommandError> {
-        let end = EndRequest::listen();
+    fn measure(&self, link: &mut BoardLink, end: &EndRequest) -> Result<Vec<SettledPose>, CommandError> {
+        let typed = stdin().is_terminal().then(typed_lines);
+        let mut refusals = Refusals::default();
         // The arm may do what it likes; only the LVDT has to stand.
         let criteria = StillnessCriteria {
             hold_us: self.hold_ms.saturating_mul(1_000),
@@ -148,19 +171,23 @@ impl LvdtArgs {
         let mut poses: Vec<SettledPose> = Vec::new();
         for &length_mm in &self.lengths {
             tell(&format!("set the bar to {length_mm} mm and hold it still"));
-            let is_told = stdin().is_terminal();
-            let ended = LvdtError::Ended { found: poses.len(), wanted: self.lengths.len() };
-            if is_told && !is_entered(&end) {
-                return Err(ended.into());
+            let ended = || Err(self.ended(poses.len(), end));
+            if typed.as_ref().is_some_and(|typed| !is_entered(typed, end)) {
+                return ended();
             }
             // Asked for anew, so that stillness before now does not count.
-            link.act(Command::SetStillness(criteria))?;
-            link.start_stream(StreamSelection { settled: true, ..StreamSelection::default() })?;
+            let started = link
+                .act(Command::SetStillness(criteria))
+                .and_then(|()| link.start_stream(StreamSelection { settled: true, ..StreamSelection::default() }));
+            if matches!(started, Err(BoardError::Stopped)) {
+                return ended();
+            }
+            started?;
             // Nobody says when the next length is set: a code that has not moved is still that of the last one.
-            let old_code = poses.last().map(|pose| pose.code_mean).filter(|_| !is_told);
+            let old_code = poses.last().map(|pose| pose.code_mean).filter(|_| typed.is_none());
             let is_new =
                 |pose: &SettledPose| old_code.is_none_or(|old| (pose.code_mean - old).abs() > f64::from(criteria.band_codes));
-            let pose = next_settled(link, &end, is_new)?.ok_or(ended)?;
+            let Some(pose) = next_settled(link, end, &mut refusals, is_new)? else { return ended() };
             tell(&format!("  code {:.1} ± {:.1} over {} samples", pose.code_mean, pose.code_std, pose.samples));
             poses.push(pose);
         }
@@ -168,25 +195,50 @@ impl LvdtArgs {
     }
 }
 
-/// Waits for Enter; false when the user ends instead.
-fn is_entered(end: &EndRequest) -> bool {
-    ask("press Enter when it stands, or Ctrl-C and Enter to end: ");
-    let is_open = stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0);
-    is_open && !end.is_made()
+/// Waits for Enter; false when the user ends instead, or nobody is there any more.
+fn is_entered(typed: &Receiver<String>, end: &EndRequest) -> bool {
+    ask("press Enter when it stands, or Ctrl-C to end: ");
+    // Typed before it was asked: meant for something else.
+    while typed.try_recv().is_ok() {}
+    while !end.is_made() {
+        match typed.recv_timeout(LOOK) {
+            Ok(_) => return true,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return false,
+        }
+    }
+    tell("");
+    false
 }
 
+/// The next pose that stands and is new; `None` when the user ends instead. A board that falls silent is asked how it is.
 fn next_settled(
     link: &mut BoardLink,
     end: &EndRequest,
+    refusals: &mut Refusals,
     is_new: impl Fn(&SettledPose) -> bool,
 ) -> Result<Option<SettledPose>, CommandError> {
+    let mut heard = Instant::now();
     while !end.is_made() {
-        if let Some(frame) = link.next_frame()?
-            && let ToHost::Stream(stream) = frame.message
-            && let Event::Settled(pose) = stream.event
-            && is_new(&pose)
-        {
-            return Ok(Some(pose));
+        match link.next_frame()?.map(|frame| frame.message) {
+            Some(Ok(stream)) => {
+                heard = Instant::now();
+                if let Event::Settled(pose) = stream.event
+                    && is_new(&pose)
+                {
+                    return Ok(Some(pose));
+                }
+            }
+            Some(Err(reason)) => refusals.note(reason).iter().for_each(|words| warn(words)),
+            None if heard.elapsed() >= SILENCE => {
+                heard = Instant::now();
+                match link.request(Command::Status) {
+                    Ok(Answer::Status(status)) if status.streaming.is_none() => return Err(LvdtError::NotStreaming.into()),
+                    Ok(_) | Err(BoardError::Stopped) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            None => {}
         }
     }
     Ok(None)
@@ -224,6 +276,9 @@ impl Report for LvdtReport {
         let mut text = table.text();
         text += &format!("degree {}: RMS {:.4} mm, largest {:.4} mm\n", self.degree, self.rms_mm, self.max_abs_mm);
         text += &format!("codes {} to {}; {}\n", self.code_min, self.code_max, self.outcome);
+        if self.losses.refused.all() > 0 {
+            text += &format!("REFUSED: {}\n", self.losses.refused);
+        }
         text
     }
 }

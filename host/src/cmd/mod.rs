@@ -37,6 +37,7 @@ mod simulate;
 mod status;
 mod stream;
 mod table;
+mod typed;
 #[cfg(not(unix))]
 mod unix_only;
 mod validate;

@@ -3,12 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use ballbar::StillnessCriteria;
+use ballbar::{JointKind, StillnessCriteria};
 use clap::Args;
+use miette::Diagnostic;
+use thiserror::Error;
 
 use super::outcome::{CommandError, INTERRUPTED};
 use super::screen::give_back;
 use crate::board::{BAUD, BoardLink};
+use crate::deadline::StopFlag;
+use crate::files::Robot;
 
 /// Which board.
 #[derive(Args)]
@@ -25,6 +29,25 @@ impl PortArgs {
     pub(super) fn connect(&self) -> Result<BoardLink, CommandError> {
         Ok(BoardLink::connect(&self.port, self.baud)?)
     }
+}
+
+/// A robot's file that is of another robot than the board's.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{robot} has {found} joints, the board's robot {expected}, or joints of other kinds")]
+#[diagnostic(help("Give the robot that the board holds: `host-cal status PORT` names it."))]
+pub(super) struct OtherRobot {
+    robot: String,
+    found: usize,
+    expected: usize,
+}
+
+/// A robot has the joints of the board's.
+pub(super) fn check_kinds(robot: &Robot, on_board: &[JointKind]) -> Result<(), OtherRobot> {
+    let kinds = robot.chain.joint_kinds();
+    if kinds == on_board {
+        return Ok(());
+    }
+    Err(OtherRobot { robot: robot.source_name().to_owned(), found: kinds.len(), expected: on_board.len() })
 }
 
 /// When the arm stands still.
@@ -52,7 +75,7 @@ impl StillnessArgs {
 #[derive(Clone, Default)]
 pub(super) struct EndRequest {
     /// By whatever means.
-    is_made: Arc<AtomicBool>,
+    stop: StopFlag,
     /// By Ctrl-C or a signal.
     is_insisted: Arc<AtomicBool>,
 }
@@ -69,7 +92,7 @@ impl EndRequest {
 
     /// The user wants to end.
     pub(super) fn make(&self) {
-        self.is_made.store(true, Ordering::Relaxed);
+        self.stop.set();
     }
 
     /// The user wants to end; asked twice, whatever the work waits for is not worth it.
@@ -82,6 +105,11 @@ impl EndRequest {
     }
 
     pub(super) fn is_made(&self) -> bool {
-        self.is_made.load(Ordering::Relaxed)
+        self.stop.is_set()
+    }
+
+    /// For whoever waits for a board or a controller.
+    pub(super) fn stop_flag(&self) -> &StopFlag {
+        &self.stop
     }
 }

@@ -9,7 +9,7 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
 use super::report::{Report, print, warn};
-use crate::board::{BoardError, RobotOnBoard};
+use crate::board::{BoardError, Implausible, RobotOnBoard};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, joints_text, mm_from_m};
 use ballbar::JointKind;
@@ -49,6 +49,12 @@ impl PoseArgs {
         };
         let robot = RobotOnBoard::read(&mut link)?.map(|(robot, _)| robot);
         let robot = robot.ok_or(BoardError::WrongAnswer { command: "read parameters" })?;
+        // The board has said twice how many joints its robot has.
+        let (found, expected) = (pose.q.len(), robot.kinds().len());
+        if found != expected {
+            let reason = Implausible::WrongCount { what: "joint values", found, expected };
+            return Err(BoardError::Implausible { command: "current pose", reason }.into());
+        }
         let report = PoseReport::new(&pose, &robot);
         if !report.homed {
             warn("not every encoder is homed since the board started: the pose means little. host-cal home PORT --q …");

@@ -16,11 +16,11 @@ use thiserror::Error;
 
 use super::inputs::{OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
-use super::port::{PortArgs, StillnessArgs};
+use super::port::{PortArgs, StillnessArgs, check_kinds};
 use super::report::{Report, print, warn};
 use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
-use crate::files::Rig;
-use crate::session::{Connection, Recorder, Run};
+use crate::files::{Rig, Robot};
+use crate::session::{Connection, ROBOT_NAME, Recorder, Run};
 use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
 use account::Account;
@@ -67,6 +67,9 @@ pub(super) struct StreamArgs {
     /// rig.toml, or the built-in: triangles; checks the pairing and the bar, and lets the screen show residuals
     #[arg(long)]
     rig: Option<String>,
+    /// The robot, whose joint limits are watched: robot.toml, or a built-in; the session's own where it has one
+    #[arg(long)]
+    robot: Option<String>,
     /// Temperature, kept with the session, degrees Celsius
     #[arg(long, value_name = "C")]
     temperature_c: Option<f64>,
@@ -112,6 +115,8 @@ struct StreamReport {
     poses_written: u64,
     /// Settled poses that were not written because not every encoder was homed.
     poses_withheld: u64,
+    /// Settled poses with a joint beyond its limits; none when the limits are not known.
+    beyond_limits: Option<u64>,
     losses: StreamLosses,
     frames: FrameLine,
     gaps: u64,
@@ -132,20 +137,25 @@ struct FrameLine {
 impl StreamArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let connection = self.connection()?;
+        let limits = self.limits()?;
         let mut link = self.port.connect()?;
         let robot = RobotOnBoard::read(&mut link)?;
         if robot.is_none() && (connection.is_some() || self.pose) {
             return Err(StreamError::NoParameters.into());
         }
+        if let (Some(limits), Some((robot, _))) = (&limits, &robot) {
+            check_kinds(limits, robot.kinds())?;
+        }
         let recorder = self.recorder(&link, robot.as_ref(), connection.clone())?;
         let model = self.model(robot.as_ref().map(|(robot, _)| robot))?;
-        let account = Account::new(robot.map(|(robot, _)| robot), model, recorder, connection, self.stillness.criteria());
+        let robot = robot.map(|(robot, _)| robot);
+        let account = Account::new(robot, limits, model, recorder, connection, self.stillness.criteria());
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
         let report = watch.finish()?;
         print(&report, self.output.json)?;
         ended?;
-        let doubts = report.losses.missing + report.losses.overruns + report.gaps + report.poses_withheld;
+        let doubts = report.losses.lost() + report.gaps + report.poses_withheld;
         Ok(if doubts == 0 { Outcome::Good } else { Outcome::Doubtful })
     }
 
@@ -153,6 +163,15 @@ impl StreamArgs {
     fn selection(&self) -> StreamSelection {
         let nothing_said = !(self.raw || self.settled || self.pose);
         StreamSelection { samples: self.raw || nothing_said, settled: self.settled || nothing_said, poses: self.pose }
+    }
+
+    /// The robot whose limits are watched, as far as anybody has said.
+    fn limits(&self) -> Result<Option<Robot>, CommandError> {
+        if let Some(robot) = &self.robot {
+            return Ok(Some(Robot::open(robot)?));
+        }
+        let kept = self.session.as_ref().map(|session| session.join(ROBOT_NAME)).filter(|path| path.is_file());
+        Ok(kept.map(|path| Robot::open(&path.to_string_lossy())).transpose()?)
     }
 
     /// Tells the board what to do; again after it was away.
@@ -267,13 +286,16 @@ impl Report for StreamReport {
         text += &self.measured_rate_hz.map_or(String::new(), |hz| format!(" at {hz:.1} Hz"));
         text += &format!(", {} settled poses, {} tool poses\n", self.settled, self.tool_poses);
         let losses = &self.losses;
-        text += &match losses.missing + losses.overruns {
+        text += &match losses.lost() {
             0 => "nothing lost\n".to_owned(),
             _ => format!(
                 "LOST: {} messages ({} dropped by the board, {} on the line), {} samples by overrun\n",
                 losses.missing, losses.dropped_by_board, losses.lost_on_line, losses.overruns
             ),
         };
+        if losses.refused.all() > 0 {
+            text += &format!("REFUSED: {}\n", losses.refused);
+        }
         let frames = &self.frames;
         if frames.crc + frames.malformed + frames.overlong + frames.not_understood > 0 {
             text += &format!(
@@ -287,6 +309,11 @@ impl Report for StreamReport {
         if let Some(session) = &self.session {
             text += &format!("recorded in {}, {} poses added to poses.csv\n", one_line(session), self.poses_written);
         }
+        text += &match self.beyond_limits {
+            None if self.settled > 0 => "joint limits were not watched: they are not known without --robot\n".to_owned(),
+            None | Some(0) => String::new(),
+            Some(poses) => format!("{poses} poses have a joint BEYOND ITS LIMITS: is the board homed where the robot stands?\n"),
+        };
         if self.poses_withheld > 0 {
             text += &format!("{} poses were NOT WRITTEN because the encoders are not homed\n", self.poses_withheld);
         }

@@ -2,12 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use ballbar::wire::{Answer, Command, Event, Status, Stream, StreamSelection, ToHost};
+use ballbar::wire::{Answer, Command, Event, Stream, StreamSelection};
 use ballbar::{JointVector, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria};
 
 use super::errors::CollectError;
 use super::track::TrackPoint;
-use crate::board::{BoardError, BoardLink, RobotOnBoard, StreamLosses, StreamTally};
+use crate::board::{BoardError, BoardLink, Frame, Refusals, RobotOnBoard, StreamLosses};
+use crate::deadline::StopFlag;
 use crate::session::Recorder;
 
 /// The arm at the latest sample.
@@ -49,7 +50,9 @@ pub struct BoardWatch {
     /// Follows the board's own detector.
     detector: SettleDetector,
     period_us: u64,
-    tally: StreamTally,
+    refusals: Refusals,
+    /// What is to be said of refused messages.
+    refusal: Option<String>,
     /// Time and index of the first sample.
     first: Option<(u64, u32)>,
     /// Index of the latest.
@@ -65,10 +68,13 @@ pub struct BoardWatch {
 const SILENCE: Duration = Duration::from_secs(3);
 /// The same while the robot moves: at 30 degrees per second it goes as many.
 const SILENCE_ON_THE_WAY: Duration = Duration::from_secs(1);
-/// How long the rest of a stream may take that was ended.
-const LAST_WORDS: Duration = Duration::from_secs(2);
 
 impl BoardWatch {
+    /// From here on nothing is waited for any longer once the flag is set.
+    pub fn heed(&mut self, stop: &StopFlag) {
+        self.link.heed(stop);
+    }
+
     /// Lets a board stream samples and settled poses.
     ///
     /// # Errors
@@ -83,7 +89,7 @@ impl BoardWatch {
         link.act(Command::SetRate { rate_hz })?;
         link.act(Command::SetStillness(criteria))?;
         link.start_stream(StreamSelection { samples: true, settled: true, poses: false })?;
-        let (tally, detector) = (StreamTally::default(), SettleDetector::new(criteria));
+        let (refusals, refusal, detector) = (Refusals::default(), None, SettleDetector::new(criteria));
         let (heard, period_us) = (Instant::now(), 1_000_000 / u64::from(rate_hz.max(1)));
         let (first, index, view, stand, track, is_watchful) = (None, 0, None, None, None, false);
         Ok(Self {
@@ -93,7 +99,8 @@ impl BoardWatch {
             criteria,
             detector,
             period_us,
-            tally,
+            refusals,
+            refusal,
             first,
             index,
             view,
@@ -117,19 +124,19 @@ impl BoardWatch {
     /// Takes one frame, or waits some milliseconds for one.
     ///
     /// # Errors
-    /// [`CollectError::Silent`], [`CollectError::Port`], [`CollectError::Record`].
+    /// [`CollectError::Silent`], also when what comes is not to be believed, [`CollectError::Port`], [`CollectError::Record`].
     pub fn listen(&mut self) -> Result<(), CollectError> {
-        let Some(frame) = self.link.next_frame()? else {
-            let silence = if self.is_watchful { SILENCE_ON_THE_WAY } else { SILENCE };
-            let silent = self.heard.elapsed();
-            return if silent > silence { Err(self.silent(silent)) } else { Ok(()) };
-        };
-        if let ToHost::Stream(stream) = &frame.message {
-            self.heard = Instant::now();
-            self.recorder.frame(&frame.bytes)?;
-            self.take(stream);
+        if let Some(frame) = self.link.next_frame()? {
+            self.take(&frame)?;
         }
-        Ok(())
+        let silence = if self.is_watchful { SILENCE_ON_THE_WAY } else { SILENCE };
+        let silent = self.heard.elapsed();
+        if silent > silence { Err(self.silent(silent)) } else { Ok(()) }
+    }
+
+    /// What is to be said of messages that were refused, once for each reason.
+    pub(super) fn take_refusal(&mut self) -> Option<String> {
+        self.refusal.take()
     }
 
     fn silent(&self, silent: Duration) -> CollectError {
@@ -150,6 +157,7 @@ impl BoardWatch {
             if let Some(view) = self.view {
                 return Ok(view);
             }
+            self.link.check_stop()?;
             self.listen()?;
         }
     }
@@ -167,7 +175,7 @@ impl BoardWatch {
 
     /// What was lost so far.
     pub fn losses(&self) -> StreamLosses {
-        self.tally.losses()
+        self.link.losses()
     }
 
     /// The latest pose at which the arm stood still, once.
@@ -221,6 +229,7 @@ impl BoardWatch {
             if began.elapsed() > SILENCE {
                 return Err(self.silent(began.elapsed()));
             }
+            self.link.check_stop()?;
             self.listen()?;
         }
     }
@@ -239,32 +248,27 @@ impl BoardWatch {
     /// Ends stream and session; tells what was lost, and whether all could be written.
     pub fn end(mut self) -> (StreamLosses, Result<(), CollectError>) {
         // A board that is gone by now needs no end.
-        let _ = self.link.act(Command::StopStream);
-        let status = self.link.request(Command::Status);
-        let written = self.take_rest();
-        if let Ok(Answer::Status(status)) = status {
-            self.tally.end(&status as &Status);
-        }
+        let _ = self.link.end_stream();
+        // What the board had gathered came before its answers.
+        let written = self.link.take_frames().iter().try_for_each(|frame| self.take(frame));
         let ended = self.recorder.end().map_err(CollectError::from);
-        (self.tally.losses(), written.and(ended))
+        (self.link.losses(), written.and(ended))
     }
 
-    /// What the board had gathered comes before its answers.
-    fn take_rest(&mut self) -> Result<(), CollectError> {
-        let began = Instant::now();
-        while let Ok(Some(frame)) = self.link.next_frame()
-            && began.elapsed() < LAST_WORDS
-        {
-            if let ToHost::Stream(stream) = &frame.message {
-                self.recorder.frame(&frame.bytes)?;
-                self.take(stream);
+    /// Keeps a frame as it came, and takes what is to be believed of it.
+    fn take(&mut self, frame: &Frame) -> Result<(), CollectError> {
+        self.recorder.frame(&frame.bytes)?;
+        match &frame.message {
+            Ok(stream) => {
+                self.heard = Instant::now();
+                self.take_stream(stream);
             }
+            Err(reason) => self.refusal = self.refusals.note(*reason).or(self.refusal.take()),
         }
         Ok(())
     }
 
-    fn take(&mut self, stream: &Stream) {
-        self.tally.take(stream);
+    fn take_stream(&mut self, stream: &Stream) {
         let is_homed = self.robot.is_homed(stream.homed);
         match &stream.event {
             Event::Samples(batch) => batch.samples().for_each(|sample| self.take_sample(&sample, is_homed)),

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use ballbar::JointVector;
 
 use super::Nearness;
-use super::board_watch::{BoardWatch, Stand};
+use super::board_watch::{BoardWatch, Stand, View};
 use super::check_board::check_board;
 use super::drive::Drive;
 use super::errors::CollectError;
@@ -15,9 +15,9 @@ use super::ledger::{Joined, Ledger, RowState};
 use super::operator::{Event, Measured, Operator, Wish};
 use super::repeat::Repeat;
 use super::track::TrackOptions;
-use crate::board::StreamLosses;
+use crate::board::{BoardError, StreamLosses};
 use crate::plan::Cell;
-use crate::robot_link::JointSpeed;
+use crate::robot_link::{JointSpeed, LinkError};
 use crate::session::{Connection, MeasuredPose};
 use crate::units::mm_from_m;
 
@@ -120,6 +120,8 @@ pub struct Collector<'a, 'o> {
     pub(super) stands: HashMap<usize, Stand>,
     /// The row that the arm is to go to, or is at.
     pub(super) goal: Option<usize>,
+    /// Joints of which it was said that they are beyond their limits.
+    said_beyond: Vec<usize>,
     missed_in_a_row: usize,
     rows_done: usize,
     began: Instant,
@@ -155,6 +157,7 @@ impl<'a, 'o> Collector<'a, 'o> {
             summary,
             stands,
             goal: None,
+            said_beyond: Vec::new(),
             missed_in_a_row,
             rows_done: 0,
             began,
@@ -167,8 +170,8 @@ impl<'a, 'o> Collector<'a, 'o> {
     /// # Errors
     /// [`CollectError`] when it has to stop before; the robot was stopped then.
     pub fn drive(&mut self, robot: &mut dyn crate::robot_link::RobotLink) -> Result<Ended, CollectError> {
-        self.check_board()?;
-        Drive::new(self, robot).run()
+        let ended = self.check_board().and_then(|()| Drive::new(self, robot).run());
+        quit_if_stopped(ended)
     }
 
     /// Measures all that is left, while somebody or something else moves the robot: every pose at which it stands still counts for
@@ -177,8 +180,8 @@ impl<'a, 'o> Collector<'a, 'o> {
     /// # Errors
     /// [`CollectError`] when it has to stop before.
     pub fn follow(&mut self, near: Nearness, guide: &Guide) -> Result<Ended, CollectError> {
-        self.check_board()?;
-        self.follow_all(near, guide)
+        let ended = self.check_board().and_then(|()| self.follow_all(near, guide));
+        quit_if_stopped(ended)
     }
 
     /// Ends the stream and the session. What came of the run, the plan with what is done of it, and whether the session could be
@@ -191,11 +194,27 @@ impl<'a, 'o> Collector<'a, 'o> {
     /// Hears the board, and shows the operator the arm now and then.
     pub(super) fn listen(&mut self) -> Result<(), CollectError> {
         self.board.listen()?;
+        if let Some(refusal) = self.board.take_refusal() {
+            self.trouble(refusal)?;
+        }
         if self.told.elapsed() > TELL
             && let Some(now) = self.now()
         {
             self.told = Instant::now();
             self.operator.tell(&Event::Now(&now))?;
+            self.watch_limits(&now.view)?;
+        }
+        Ok(())
+    }
+
+    /// Says once of every joint that the encoders have it beyond its limits.
+    fn watch_limits(&mut self, view: &View) -> Result<(), CollectError> {
+        let robot = self.cell.robot;
+        for beyond in robot.beyond_limits(view.q.as_array()).filter(|_| view.is_homed) {
+            if !self.said_beyond.contains(&beyond.joint) {
+                self.said_beyond.push(beyond.joint);
+                self.trouble(format!("{beyond}: is the board homed where the robot stands?"))?;
+            }
         }
         Ok(())
     }
@@ -384,5 +403,13 @@ impl<'a, 'o> Collector<'a, 'o> {
     fn check_board(&mut self) -> Result<(), CollectError> {
         let is_homed = self.board.view()?.is_homed;
         check_board(self.cell.robot, self.board.robot(), is_homed)
+    }
+}
+
+/// A wait that the user has ended is no error.
+fn quit_if_stopped(ended: Result<Ended, CollectError>) -> Result<Ended, CollectError> {
+    match ended {
+        Err(CollectError::Board(BoardError::Stopped) | CollectError::Robot(LinkError::Stopped)) => Ok(Ended::Quit),
+        ended => ended,
     }
 }

@@ -31,8 +31,8 @@ pub enum CollectError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Poses(#[from] InputError),
-    /// Nothing comes from the board.
-    #[error("{port}: nothing has come from the board for {seconds:.0} s; the robot was stopped")]
+    /// Nothing comes from the board, or nothing that is to be believed.
+    #[error("{port}: nothing to believe has come from the board for {seconds:.0} s; the robot was stopped")]
     #[diagnostic(help("`host-cal status {port}` shows how the board is. Run the same command again to go on."))]
     Silent {
         /// The port.

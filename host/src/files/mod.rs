@@ -7,6 +7,7 @@ mod builtin;
 mod csv_rows;
 mod encoding;
 mod kind;
+mod limits;
 mod numbers;
 mod plan_rows;
 mod poses;
@@ -24,6 +25,7 @@ mod write;
 
 pub use builtin::{RIGS, ROBOTS};
 pub use kind::FileKind;
+pub use limits::BeyondLimits;
 pub use plan_rows::{BarAt, PlanRow, RowKind, RowMargins, read_plan, write_plan};
 pub use poses::{Dataset, Motion, PoseRow, RowWarning, pose_header, pose_record, write_poses};
 pub use problem::Problem;

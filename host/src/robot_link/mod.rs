@@ -26,6 +26,7 @@ use ballbar::JointVector;
 use miette::Diagnostic;
 use thiserror::Error;
 
+use crate::deadline::StopFlag;
 pub use patience::Patience;
 pub use speed::JointSpeed;
 
@@ -76,6 +77,9 @@ pub enum LinkError {
         /// What such a controller says here.
         expected: &'static str,
     },
+    /// The user wants to end, so that an answer was not waited for.
+    #[error("ended by Ctrl-C or a signal")]
+    Stopped,
 }
 
 /// A robot's controller. Joint vectors are encoder outputs as in robot.toml, radians or metres.
@@ -114,4 +118,8 @@ pub trait RobotLink {
     /// # Errors
     /// [`LinkError`].
     fn recover(&mut self) -> Result<(), LinkError>;
+
+    /// From here on no answer is waited for any longer once the flag is set, but for what stops the robot: [`LinkError::Stopped`] comes
+    /// instead. A link that never waits has nothing to heed.
+    fn heed(&mut self, _stop: &StopFlag) {}
 }

@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+/// How long the answer to a stop is waited for: the robot stops whether or not somebody hears of it.
+pub(super) const STOP_WAIT: Duration = Duration::from_millis(500);
+
 /// How long a link waits before it draws its conclusions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {

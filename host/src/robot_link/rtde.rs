@@ -8,10 +8,11 @@
 //! (UniversalRobots/RTDE_Python_Client_Library: rtde/rtde.py, rtde/serialize.py); values of the modes as in its C++ client library
 //! (UniversalRobots/Universal_Robots_Client_Library: ur/datatypes.h, rtde/data_package.h).
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::LinkError;
 use super::tcp::Tcp;
+use crate::deadline::{StopFlag, WaitOver};
 
 /// Joints of every UR.
 pub(super) const JOINTS: usize = 6;
@@ -134,7 +135,7 @@ impl Rtde {
     /// # Errors
     /// [`LinkError`].
     pub(super) fn connect(host: &str, port: u16, wait: Duration) -> Result<Self, LinkError> {
-        let mut rtde = Self { tcp: Tcp::connect(host, port, wait)?, heard: Vec::new(), recipe: 0 };
+        let mut rtde = Self { tcp: Tcp::connect(host, port, wait, &StopFlag::default())?, heard: Vec::new(), recipe: 0 };
         if rtde.ask(b'V', &2_u16.to_be_bytes(), wait)? != [1] {
             return Err(rtde.tcp.unexpected("no".into(), "yes to RTDE protocol version 2 (software 3.3 or newer)"));
         }
@@ -175,8 +176,13 @@ impl Rtde {
         // Every request is far shorter than 65,536 bytes.
         let size = (HEAD + payload.len()) as u16;
         self.tcp.write_all(&[&size.to_be_bytes(), &[kind][..], payload].concat())?;
-        let deadline = Instant::now() + wait;
-        while Instant::now() < deadline {
+        let deadline = self.tcp.deadline(wait);
+        loop {
+            match deadline.check() {
+                Ok(()) => {}
+                Err(WaitOver::Late) => return Err(self.tcp.unexpected("nothing".into(), "an answer to an RTDE request")),
+                Err(WaitOver::Stopped) => return Err(LinkError::Stopped),
+            }
             match self.package()? {
                 Some((answer, payload)) if answer == kind => return Ok(payload),
                 // What the controller tells people does not belong to the request.
@@ -184,7 +190,6 @@ impl Rtde {
                 Some((other, _)) => return Err(self.tcp.unexpected(readable(&[other]), "an answer to an RTDE request")),
             }
         }
-        Err(self.tcp.unexpected("nothing".into(), "an answer to an RTDE request"))
     }
 
     /// Type and payload of the next package, `None` when it has not come whole yet.

@@ -2,14 +2,15 @@
 //!
 //! It is the controller of `host-cal virtual-board --controller ADDRESS`, which answers every [`SimRequest`] with a [`SimReply`].
 
-use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
 use serde::{Deserialize, Serialize};
 
+use super::patience::STOP_WAIT;
+use super::tcp::{Tcp, TcpLines};
 use super::{JointSpeed, LinkError, MoveState, RobotLink};
+use crate::deadline::{Deadline, StopFlag};
 
 /// What the controller is asked. SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,14 +61,16 @@ pub enum SimReply {
 
 /// A connection to the controller.
 pub struct SimClient {
-    address: String,
-    lines: BufReader<TcpStream>,
+    lines: TcpLines,
+    /// Replies that have not come yet; those of requests that were given up among them.
+    owed: usize,
 }
 
 /// How long the controller may take to answer.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// A reply is far shorter.
-const LONGEST_REPLY: u64 = 4_096;
+const LONGEST_REPLY: usize = 4_096;
+const REPLY: &str = "a reply of host-cal virtual-board's controller";
 
 impl SimClient {
     /// Connects.
@@ -75,35 +78,42 @@ impl SimClient {
     /// # Errors
     /// [`LinkError::Unreachable`].
     pub fn connect(address: &str) -> Result<Self, LinkError> {
-        let unreachable = |reason: String| LinkError::Unreachable { address: address.to_owned(), reason };
-        let mut addresses = address.to_socket_addrs().map_err(|error| unreachable(error.to_string()))?;
-        let first = addresses.next().ok_or_else(|| unreachable("the name has no address".into()))?;
-        let stream = TcpStream::connect_timeout(&first, PATIENCE).map_err(|error| unreachable(error.to_string()))?;
-        let prepared = stream.set_read_timeout(Some(PATIENCE)).and_then(|()| stream.set_nodelay(true));
-        prepared.map_err(|error| unreachable(error.to_string()))?;
-        Ok(Self { address: address.to_owned(), lines: BufReader::new(stream) })
+        let tcp = Tcp::connect_to(address, PATIENCE, &StopFlag::default())?;
+        Ok(Self { lines: TcpLines::new(tcp, LONGEST_REPLY), owed: 0 })
+    }
+
+    /// From here on no reply is waited for any longer once the flag is set.
+    pub fn heed(&mut self, stop: &StopFlag) {
+        self.lines.tcp.heed(stop);
     }
 
     /// Asks, and waits for the answer.
     ///
     /// # Errors
-    /// [`LinkError`] when the connection is gone, or something else is at its other end.
+    /// [`LinkError`] when no answer comes whole in time, the connection is gone, or something else is at its other end.
     pub fn ask(&mut self, request: &SimRequest) -> Result<SimReply, LinkError> {
-        let lost = |reason: String| LinkError::Lost { address: self.address.clone(), reason };
-        let mut line = serde_json::to_string(request).map_err(|error| lost(error.to_string()))?;
-        line.push('\n');
-        self.lines.get_mut().write_all(line.as_bytes()).map_err(|error| lost(error.to_string()))?;
-        let mut reply = String::new();
-        let mut bounded = std::io::Read::take(&mut self.lines, LONGEST_REPLY);
-        bounded.read_line(&mut reply).map_err(|error| lost(error.to_string()))?;
-        if reply.is_empty() {
-            return Err(lost("it was closed at the other end".into()));
+        let deadline = self.lines.tcp.deadline(PATIENCE);
+        self.ask_until(request, &deadline)
+    }
+
+    fn ask_until(&mut self, request: &SimRequest, deadline: &Deadline) -> Result<SimReply, LinkError> {
+        let address = self.address().to_owned();
+        let unsaid = |error: serde_json::Error| LinkError::Lost { address, reason: error.to_string() };
+        let line = serde_json::to_string(request).map_err(unsaid)? + "\n";
+        self.lines.tcp.write_all(line.as_bytes())?;
+        self.owed += 1;
+        loop {
+            let reply = self.lines.line(deadline, REPLY)?;
+            self.owed -= 1;
+            if self.owed == 0 {
+                let found = || reply.chars().take(80).collect();
+                return serde_json::from_str(&reply).map_err(|_| self.lines.tcp.unexpected(found(), REPLY));
+            }
         }
-        serde_json::from_str(&reply).map_err(|_| LinkError::Unexpected {
-            address: self.address.clone(),
-            found: reply.trim_end().chars().take(80).collect(),
-            expected: "a reply of host-cal virtual-board's controller",
-        })
+    }
+
+    fn address(&self) -> &str {
+        self.lines.tcp.address()
     }
 
     /// Asks for something that is only done or refused.
@@ -111,11 +121,20 @@ impl SimClient {
     /// # Errors
     /// As [`SimClient::ask`]; and a refusal, as [`LinkError::Unexpected`].
     pub fn act(&mut self, request: &SimRequest) -> Result<(), LinkError> {
-        match self.ask(request)? {
+        let reply = self.ask(request)?;
+        self.done(&reply)
+    }
+
+    /// As [`SimClient::act`], also when the user wants to end.
+    fn act_regardless(&mut self, request: &SimRequest) -> Result<(), LinkError> {
+        let reply = self.ask_until(request, &Deadline::regardless(STOP_WAIT))?;
+        self.done(&reply)
+    }
+
+    fn done(&self, reply: &SimReply) -> Result<(), LinkError> {
+        match reply {
             SimReply::Done => Ok(()),
-            other => {
-                Err(LinkError::Unexpected { address: self.address.clone(), found: format!("{other:?}"), expected: "`done`" })
-            }
+            other => Err(self.lines.tcp.unexpected(format!("{other:?}"), "`done`")),
         }
     }
 }
@@ -135,6 +154,11 @@ impl SimHand {
         SimClient::connect(address).map(Self)
     }
 
+    /// From here on nothing is waited for any longer once the flag is set.
+    pub fn heed(&mut self, stop: &StopFlag) {
+        self.0.heed(stop);
+    }
+
     /// Has something attached or taken off, and waits until it is.
     ///
     /// # Errors
@@ -144,7 +168,7 @@ impl SimHand {
         let began = Instant::now();
         while let SimReply::State { is_moving: true, .. } = self.0.ask(&SimRequest::State)? {
             if began.elapsed() > HAND_PATIENCE {
-                return Err(LinkError::Lost { address: self.0.address.clone(), reason: "its time stands still".into() });
+                return Err(LinkError::Lost { address: self.0.address().to_owned(), reason: "its time stands still".into() });
             }
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -182,7 +206,7 @@ impl SimLink {
                 Ok((is_moving, vector))
             }
             other => Err(LinkError::Unexpected {
-                address: self.client.address.clone(),
+                address: self.client.address().to_owned(),
                 found: format!("{other:?}"),
                 expected: "the state of a robot with as many joints",
             }),
@@ -192,7 +216,7 @@ impl SimLink {
 
 impl RobotLink for SimLink {
     fn name(&self) -> String {
-        format!("sim at {}", self.client.address)
+        format!("sim at {}", self.client.address())
     }
 
     fn start_move(&mut self, q: &JointVector<f64>, speed: &JointSpeed) -> Result<(), LinkError> {
@@ -225,10 +249,14 @@ impl RobotLink for SimLink {
         if self.latest == MoveState::Moving {
             self.latest = MoveState::Fault("stopped on the way".into());
         }
-        self.client.act(&SimRequest::Halt)
+        self.client.act_regardless(&SimRequest::Halt)
     }
 
     fn recover(&mut self) -> Result<(), LinkError> {
         Ok(())
+    }
+
+    fn heed(&mut self, stop: &StopFlag) {
+        self.client.heed(stop);
     }
 }

@@ -18,6 +18,7 @@ use super::dashboard::Dashboard;
 use super::rtde::{Heard, JOINTS, RobotState, Rtde};
 use super::tcp::Tcp;
 use super::{JointSpeed, LinkError, MoveState, Patience, RobotLink};
+use crate::deadline::{Deadline, StopFlag, WaitOver};
 
 /// Acceleration of moves, radians per second squared: `movej`'s default.
 pub(super) const ACCELERATION_RAD_S2: f64 = 1.4;
@@ -62,6 +63,7 @@ pub struct UrLink {
     words: Vec<String>,
     course: Option<Course>,
     moves: u64,
+    stop: StopFlag,
 }
 
 /// The latest move.
@@ -83,7 +85,7 @@ impl UrLink {
     /// # Errors
     /// [`LinkError`].
     pub fn connect(host: &str, ports: UrPorts, patience: Patience) -> Result<Self, LinkError> {
-        let script = Tcp::connect(host, ports.script, patience.answer)?;
+        let script = Tcp::connect(host, ports.script, patience.answer, &StopFlag::default())?;
         let mut rtde = Rtde::connect(host, ports.rtde, patience.answer)?;
         let latest = first_state(&mut rtde, patience.answer)?.ok_or_else(|| LinkError::Unexpected {
             address: format!("{host}:{}", ports.rtde),
@@ -101,6 +103,7 @@ impl UrLink {
             words: Vec::new(),
             course: None,
             moves: 0,
+            stop: StopFlag::default(),
         })
     }
 
@@ -133,8 +136,8 @@ impl UrLink {
     }
 
     /// Asks the dashboard to release a protective stop, as often as time allows.
-    fn release(&mut self, deadline: Instant) -> Result<(), LinkError> {
-        let mut dashboard = Dashboard::connect(&self.host, self.ports.dashboard, self.patience.answer)?;
+    fn release(&mut self, deadline: &Deadline) -> Result<(), LinkError> {
+        let mut dashboard = Dashboard::connect(&self.host, self.ports.dashboard, self.patience.answer, &self.stop)?;
         dashboard.ask("close safety popup")?;
         self.words.clear();
         while self.latest.is_in_protective_stop() {
@@ -142,9 +145,13 @@ impl UrLink {
             if reply.starts_with("Protective stop releasing") {
                 return Ok(());
             }
-            if Instant::now() > deadline {
-                self.words.push(reply);
-                return Ok(());
+            match deadline.check() {
+                Ok(()) => {}
+                Err(WaitOver::Late) => {
+                    self.words.push(reply);
+                    return Ok(());
+                }
+                Err(WaitOver::Stopped) => return Err(LinkError::Stopped),
             }
             std::thread::sleep(Duration::from_millis(200));
             self.listen()?;
@@ -216,18 +223,28 @@ impl RobotLink for UrLink {
     /// controller does not release a protective stop within the first five seconds. Where the dashboard does not answer, nothing is
     /// released.
     fn recover(&mut self) -> Result<(), LinkError> {
-        let deadline = Instant::now() + self.patience.recover;
+        let deadline = Deadline::after(self.patience.recover, &self.stop);
         self.listen()?;
         if self.latest.obstacle().is_none() {
             return self.stop();
         }
-        if let Err(error) = self.release(deadline) {
-            self.words.push(error.to_string());
+        match self.release(&deadline) {
+            Ok(()) => {}
+            Err(LinkError::Stopped) => return Err(LinkError::Stopped),
+            Err(error) => self.words.push(error.to_string()),
         }
-        while self.latest.is_in_protective_stop() && Instant::now() < deadline {
-            self.listen()?;
+        while self.latest.is_in_protective_stop() {
+            match deadline.check() {
+                Ok(()) => self.listen()?,
+                Err(WaitOver::Late) => break,
+                Err(WaitOver::Stopped) => return Err(LinkError::Stopped),
+            }
         }
         Ok(())
+    }
+
+    fn heed(&mut self, stop: &StopFlag) {
+        self.stop = stop.clone();
     }
 }
 

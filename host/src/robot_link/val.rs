@@ -24,11 +24,13 @@ use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
 
+use super::patience::STOP_WAIT;
 use super::speed::percent;
 use super::val_monitor::{Heard, Monitor, is_complaint, where_deg};
 use super::{JointSpeed, LinkError, MoveState, Patience, RobotLink};
 
 pub use super::val_monitor::VAL_BAUD;
+use crate::deadline::StopFlag;
 
 const JOINTS: usize = 6;
 /// The precision point that moves go to. Six characters are what VAL's names may have.
@@ -252,7 +254,7 @@ impl RobotLink for ValLink {
                 course.stage = Stage::Abort;
                 self.type_line()
             }
-            _ => self.monitor.exchange("ABORT", self.patience.answer).map(|_| ()),
+            _ => self.monitor.exchange_regardless("ABORT", STOP_WAIT).map(|_| ()),
         }
     }
 
@@ -261,6 +263,10 @@ impl RobotLink for ValLink {
         self.monitor.interrupt()?;
         self.monitor.exchange("", self.patience.recover)?;
         Ok(())
+    }
+
+    fn heed(&mut self, stop: &StopFlag) {
+        self.monitor.heed(stop);
     }
 }
 

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 
 use super::LinkError;
 use crate::board::{Port, PortError};
+use crate::deadline::{Deadline, StopFlag, WaitOver};
 
 /// Bits a second of a VAL terminal line as delivered.
 pub const VAL_BAUD: u32 = 9600;
@@ -28,12 +29,14 @@ pub(super) struct Monitor {
     held: String,
     heard_at: Instant,
     asked: Option<Asked>,
+    stop: StopFlag,
 }
 
 /// A line that waits for its reply.
 struct Asked {
     line: String,
-    deadline: Instant,
+    /// For all of the reply.
+    deadline: Deadline,
 }
 
 /// What has come.
@@ -61,7 +64,7 @@ impl Monitor {
     pub(super) fn open(port_name: &str, baud: u32, wait: Duration) -> Result<Self, LinkError> {
         let unreachable = |reason: String| LinkError::Unreachable { address: port_name.to_owned(), reason };
         let port = Port::open(port_name, baud).map_err(|error| unreachable(error.to_string()))?;
-        let mut monitor = Self { port, held: String::new(), heard_at: Instant::now(), asked: None };
+        let mut monitor = Self { port, held: String::new(), heard_at: Instant::now(), asked: None, stop: StopFlag::default() };
         if monitor.exchange("", wait)?.is_some() {
             return Ok(monitor);
         }
@@ -77,12 +80,22 @@ impl Monitor {
         self.port.name()
     }
 
+    /// From here on no reply is waited for any longer once the flag is set.
+    pub(super) fn heed(&mut self, stop: &StopFlag) {
+        self.stop = stop.clone();
+    }
+
     /// Types a line.
     ///
     /// # Errors
     /// [`LinkError::Lost`].
     pub(super) fn send(&mut self, line: &str, wait: Duration) -> Result<(), LinkError> {
-        self.asked = Some(Asked { line: line.to_owned(), deadline: Instant::now() + wait });
+        let deadline = Deadline::after(wait, &self.stop);
+        self.send_until(line, deadline)
+    }
+
+    fn send_until(&mut self, line: &str, deadline: Deadline) -> Result<(), LinkError> {
+        self.asked = Some(Asked { line: line.to_owned(), deadline });
         self.port.write_all(format!("{line}\r").as_bytes()).map_err(lost)
     }
 
@@ -101,6 +114,19 @@ impl Monitor {
     /// [`LinkError`].
     pub(super) fn exchange(&mut self, line: &str, wait: Duration) -> Result<Option<Vec<String>>, LinkError> {
         self.send(line, wait)?;
+        self.wait()
+    }
+
+    /// As [`Monitor::exchange`], also when the user wants to end: what stops the robot.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub(super) fn exchange_regardless(&mut self, line: &str, wait: Duration) -> Result<Option<Vec<String>>, LinkError> {
+        self.send_until(line, Deadline::regardless(wait))?;
+        self.wait()
+    }
+
+    fn wait(&mut self) -> Result<Option<Vec<String>>, LinkError> {
         loop {
             match self.hear()? {
                 Heard::Reply { lines, .. } => return Ok(Some(lines)),
@@ -132,11 +158,14 @@ impl Monitor {
             self.asked = None;
             return Ok(Heard::Reply { lines, is_question });
         }
-        if Instant::now() > asked.deadline {
-            self.asked = None;
-            return Ok(Heard::Overdue);
+        match asked.deadline.check() {
+            Ok(()) => Ok(Heard::Nothing),
+            Err(WaitOver::Late) => {
+                self.asked = None;
+                Ok(Heard::Overdue)
+            }
+            Err(WaitOver::Stopped) => Err(LinkError::Stopped),
         }
-        Ok(Heard::Nothing)
     }
 
     /// Cuts off whole lines.

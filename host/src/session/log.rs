@@ -13,6 +13,9 @@ use ballbar::wire::{FrameReader, LogMark, MAX_FRAME, PROTOCOL, ProtocolVersion, 
 use miette::Diagnostic;
 use thiserror::Error;
 
+use super::segments::Segments;
+use crate::board::{Implausible, MessageFilter, StreamLosses};
+
 /// Why a log cannot be read or written.
 #[derive(Debug, Error, Diagnostic)]
 pub enum LogError {
@@ -129,8 +132,10 @@ pub(crate) fn unix_ms() -> u64 {
 /// One entry of a log.
 #[derive(Clone, Debug)]
 pub enum Record {
-    /// A whole frame.
+    /// A whole frame, whose message is believed.
     Message(Box<ToHost>),
+    /// A whole frame, whose message is not to be believed.
+    Refused(Implausible),
     /// A frame that is torn or damaged.
     Damaged,
 }
@@ -140,6 +145,8 @@ pub struct LogReader {
     path: PathBuf,
     file: std::io::BufReader<File>,
     frames: FrameReader,
+    filter: MessageFilter,
+    segments: Segments,
     /// Bytes behind the last zero: the frame that was being written when the program was killed.
     unfinished: usize,
 }
@@ -154,7 +161,8 @@ impl LogReader {
         let file = File::open(&path).map_err(|error| LogError::Io { path: path.clone(), doing: "cannot be read", error })?;
         let mut file = std::io::BufReader::new(file);
         check_header(&mut file, &path)?;
-        Ok(Self { path, file, frames: FrameReader::new(), unfinished: 0 })
+        let (filter, segments) = (MessageFilter::default(), Segments::default());
+        Ok(Self { path, file, frames: FrameReader::new(), filter, segments, unfinished: 0 })
     }
 
     /// The file.
@@ -179,11 +187,28 @@ impl LogReader {
                 None => {}
                 Some(Ok(payload)) => {
                     let message = decode(payload).map(|message| Record::Message(Box::new(message)));
-                    return Ok(Some(message.unwrap_or(Record::Damaged)));
+                    return Ok(Some(self.checked(message.unwrap_or(Record::Damaged))));
                 }
-                Some(Err(_)) => return Ok(Some(Record::Damaged)),
+                Some(Err(_)) => return Ok(Some(self.checked(Record::Damaged))),
             }
         }
+    }
+
+    /// A record, refused if its message is not to be believed where it stands.
+    fn checked(&mut self, record: Record) -> Record {
+        if self.segments.begins(&record) {
+            self.filter.begin_segment();
+        }
+        let Record::Message(message) = &record else { return record };
+        match self.filter.take(message) {
+            Ok(()) => record,
+            Err(reason) => Record::Refused(reason),
+        }
+    }
+
+    /// What is missing before the latest record, or was refused.
+    pub fn losses(&self) -> StreamLosses {
+        self.filter.losses()
     }
 
     /// Bytes of a frame that the end of the file cuts off.

@@ -15,9 +15,13 @@ pub(super) struct Segments {
 impl Segments {
     /// Whether a segment begins with the next record: another board may answer from there on, and its numbers and clock are others.
     pub(super) fn begins(&mut self, record: &Record) -> bool {
-        let Record::Message(message) = record else {
-            self.is_greeting = false;
-            return false;
+        let message = match record {
+            Record::Message(message) => message,
+            Record::Refused(_) => return false,
+            Record::Damaged => {
+                self.is_greeting = false;
+                return false;
+            }
         };
         match **message {
             ToHost::Mark(_) => {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::log::{LogError, LogReader, Record};
 use super::segments::Segments;
-use crate::board::{StreamLosses, StreamTally};
+use crate::board::StreamLosses;
 
 /// What a log holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -45,10 +45,10 @@ impl LogSummary {
         Ok(summing.end(reader))
     }
 
-    /// Whether nothing is missing: no frame damaged, no message or sample lost, no port lost.
+    /// Whether nothing is missing: no frame damaged, no message or sample lost or refused, no port lost.
     pub fn is_whole(&self) -> bool {
         let Self { damaged, gaps, losses, .. } = self;
-        damaged + gaps + losses.missing + losses.overruns == 0
+        damaged + gaps + losses.lost() == 0
     }
 
     /// Counts what an event holds; returns its last time, microseconds.
@@ -74,7 +74,6 @@ impl LogSummary {
 #[derive(Debug, Default)]
 pub(super) struct Summing {
     summary: LogSummary,
-    tally: StreamTally,
     segments: Segments,
     /// Time of the latest event of this segment by the board's clock, microseconds.
     last_us: Option<u64>,
@@ -84,12 +83,18 @@ impl Summing {
     /// Counts the next record.
     pub(super) fn take(&mut self, record: &Record) {
         if self.segments.begins(record) {
-            self.tally.interrupt();
             self.last_us = None;
         }
-        let Record::Message(message) = record else {
-            self.summary.damaged += 1;
-            return;
+        let message = match record {
+            Record::Message(message) => message,
+            Record::Refused(_) => {
+                self.summary.frames += 1;
+                return;
+            }
+            Record::Damaged => {
+                self.summary.damaged += 1;
+                return;
+            }
         };
         self.summary.frames += 1;
         match &**message {
@@ -98,7 +103,6 @@ impl Summing {
                 self.summary.gaps += u64::from(matches!(mark, LogMark::Lost { .. }));
             }
             ToHost::Stream(stream) => {
-                self.tally.take(stream);
                 let now_us = self.summary.count(&stream.event);
                 let step_us = self.last_us.map_or(0, |last_us| now_us.saturating_sub(last_us));
                 self.summary.duration_s += step_us as f64 * 1e-6;
@@ -110,6 +114,6 @@ impl Summing {
 
     /// The summary of what was taken from this reader.
     pub(super) fn end(self, reader: &LogReader) -> LogSummary {
-        LogSummary { unfinished_bytes: reader.unfinished_bytes(), losses: self.tally.losses(), ..self.summary }
+        LogSummary { unfinished_bytes: reader.unfinished_bytes(), losses: reader.losses(), ..self.summary }
     }
 }

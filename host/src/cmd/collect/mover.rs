@@ -6,6 +6,7 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use crate::cmd::outcome::CommandError;
+use crate::deadline::StopFlag;
 use crate::robot_link::program::Dialect;
 use crate::robot_link::sim::SimLink;
 use crate::robot_link::urscript::{UrLink, UrPorts};
@@ -135,6 +136,13 @@ fn six_revolute(link: &'static str, kinds: &[JointKind]) -> Result<(), MoverErro
 }
 
 impl Mover {
+    /// From here on no controller is waited for any longer once the flag is set.
+    pub(super) fn heed(&mut self, stop: &StopFlag) {
+        if let Self::Link(link) = self {
+            link.heed(stop);
+        }
+    }
+
     /// For the session.
     pub(super) fn name(&self) -> String {
         match self {

@@ -1,15 +1,15 @@
 //! The operator at a terminal: keys and a steady screen, or lines in and lines out; and the hand of the simulation.
 
-use std::io::{BufRead, stdin};
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
+use std::sync::mpsc::{Receiver, TryRecvError};
 
 use ballbar::JointKind;
 
 use super::picture::{Next, Still, picture};
 use crate::cmd::port::EndRequest;
 use crate::cmd::screen::{Key, Screen};
+use crate::cmd::typed::typed_lines;
 use crate::collect::{Event, Operator, Wish};
+use crate::deadline::StopFlag;
 use crate::robot_link::LinkError;
 use crate::robot_link::sim::{SimHand, SimRequest};
 use crate::session::Connection;
@@ -27,6 +27,15 @@ pub(super) enum Hand {
     Nobody,
     /// The simulation's.
     Sim(SimHand),
+}
+
+impl Hand {
+    /// From here on nothing is waited for any longer once the flag is set.
+    pub(super) fn heed(&mut self, stop: &StopFlag) {
+        if let Self::Sim(hand) = self {
+            hand.heed(stop);
+        }
+    }
 }
 
 /// A person at the terminal, or none, with a hand.
@@ -190,22 +199,6 @@ impl Terminal {
         }
         Some(wish)
     }
-}
-
-/// Lines of stdin; a thread reads them, since no read of a line can be given up.
-fn typed_lines() -> Receiver<String> {
-    let (sender, receiver) = channel();
-    let read = move || {
-        for line in stdin().lock().lines() {
-            let Ok(line) = line else { return };
-            if sender.send(line).is_err() {
-                return;
-            }
-        }
-    };
-    // Without the thread it is as if stdin were closed.
-    let _ = thread::Builder::new().name("stdin".into()).spawn(read);
-    receiver
 }
 
 fn words(bar: &Connection) -> String {

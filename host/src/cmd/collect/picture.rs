@@ -73,7 +73,7 @@ pub(super) fn picture(still: &Still, now: &Now, next: &Next, asked: Option<&str>
         },
         tool_mm: None,
         rate_hz: now.rate_hz,
-        lost: now.losses.missing + now.losses.overruns,
+        lost: now.losses.lost(),
         stillness: Some(now.view.stillness),
         is_homed: Some(now.view.is_homed),
         residual_mm: now.residual_m.map(mm_from_m),

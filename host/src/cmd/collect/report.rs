@@ -98,7 +98,7 @@ impl CollectReport {
 
     /// Whether all that was planned is measured or skipped, and nothing was lost.
     pub(super) fn is_complete(&self) -> bool {
-        self.status == "done" && self.missed.is_empty() && self.losses.missing + self.losses.overruns == 0
+        self.status == "done" && self.missed.is_empty() && self.losses.lost() == 0
     }
 }
 
@@ -130,10 +130,13 @@ impl Report for CollectReport {
         for trouble in &self.troubles {
             text += &format!("trouble: {}\n", one_line(trouble));
         }
-        text += &match self.losses.missing + self.losses.overruns {
+        text += &match self.losses.lost() {
             0 => "nothing lost\n".to_owned(),
             lost => format!("LOST: {lost} messages or samples\n"),
         };
+        if self.losses.refused.all() > 0 {
+            text += &format!("REFUSED: {}\n", self.losses.refused);
+        }
         if self.left + self.missed.len() > 0 {
             text += "The same command goes on.\n";
         } else {

@@ -1,11 +1,11 @@
 //! The demo's hardware: a virtual board, and the host's end of its wire.
 
-use ballbar::wire::{Command, Event, StreamSelection, ToHost};
+use ballbar::wire::{Command, Event, StreamSelection};
 use ballbar::{SettledPose, StillnessCriteria};
 use miette::Diagnostic;
 use thiserror::Error;
 
-use crate::board::{BAUD, BoardLink, NOMINAL_TRAVEL_M, RobotOnBoard, StreamLosses, StreamTally, parameter_set};
+use crate::board::{BAUD, BoardLink, NOMINAL_TRAVEL_M, RobotOnBoard, parameter_set};
 use crate::cmd::outcome::CommandError;
 use crate::cmd::report::progress;
 use crate::files::{PairingId, Rig, Robot, pose_header, pose_record};
@@ -33,7 +33,6 @@ pub(super) struct Bench<'a> {
 pub(super) struct Collected {
     /// The text of a file of poses.
     pub(super) csv: String,
-    pub(super) losses: StreamLosses,
 }
 
 #[derive(Debug, Error, Diagnostic)]
@@ -97,10 +96,9 @@ impl<'a> Bench<'a> {
         let pairings: Vec<PairingId> =
             shells.pairings.iter().flat_map(|&pairing| std::iter::repeat_n(pairing, shells.per_pairing)).collect();
         let mut csv = pose_header(&kinds, &[]) + "\n";
-        let mut tally = StreamTally::default();
         let bar = progress(stations.len() as u64, what);
         let mut number = 0;
-        while let Some(pose) = self.next_pose(&mut tally)? {
+        while let Some(pose) = self.next_pose()? {
             number += 1;
             let (Some(station), Some(&pairing)) = (stations.get(number - 1), pairings.get(number - 1)) else { continue };
             let (q, displacement_m) = self.robot.settled(&pose);
@@ -119,20 +117,19 @@ impl<'a> Bench<'a> {
         if number != stations.len() {
             return Err(BenchError::Count { found: number, expected: stations.len() }.into());
         }
-        Ok(Collected { csv, losses: tally.losses() })
+        Ok(Collected { csv })
     }
 
     /// The next pose that settles; `None` when the robot is done and nothing is on its way any more.
-    fn next_pose(&mut self, tally: &mut StreamTally) -> Result<Option<SettledPose>, CommandError> {
+    fn next_pose(&mut self) -> Result<Option<SettledPose>, CommandError> {
         loop {
             let is_over = self.board.is_done() && self.board.is_drained();
             match self.link.next_frame()? {
                 Some(frame) => {
-                    if let ToHost::Stream(stream) = frame.message {
-                        tally.take(&stream);
-                        if let Event::Settled(pose) = stream.event {
-                            return Ok(Some(pose));
-                        }
+                    if let Ok(stream) = frame.message
+                        && let Event::Settled(pose) = stream.event
+                    {
+                        return Ok(Some(pose));
                     }
                 }
                 None if is_over => return Ok(None),

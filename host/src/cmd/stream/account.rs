@@ -1,24 +1,32 @@
 //! What came of a stream so far: counts, losses, the latest values, and the recording.
 
-use ballbar::wire::{Event, Status, Stream, ToHost};
+use ballbar::wire::{Event, Status, Stream};
 use ballbar::{JointVector, SettleDetector, SettledPose, StillnessCriteria};
 
 use super::live::{Latest, Model};
 use super::record_error;
 use super::watch::RobotAndFrame;
-use crate::board::{Frame, RobotOnBoard, StreamTally};
+use crate::board::{Frame, Refusals, RobotOnBoard, StreamLosses};
 use crate::cmd::outcome::CommandError;
+use crate::files::{BeyondLimits, Robot};
 use crate::session::{Connection, MeasuredPose, Recorder};
 use crate::units::{mm_from_m, tidy};
 
 /// The books of one run.
 pub(super) struct Account {
     pub(super) robot: Option<RobotOnBoard>,
+    /// The robot's file, for its limits.
+    pub(super) limits: Option<Robot>,
+    /// Settled poses with a joint beyond its limits, and joints of which it was said.
+    pub(super) beyond_limits: u64,
+    said_beyond: Vec<usize>,
     /// What computes lengths, where that can be.
     model: Option<Model>,
     pub(super) recorder: Option<Recorder>,
     pub(super) connection: Option<Connection>,
-    pub(super) tally: StreamTally,
+    /// Of this link and those before it.
+    losses: StreamLosses,
+    losses_before: StreamLosses,
     pub(super) latest: Latest,
     pub(super) samples: u64,
     pub(super) settled: u64,
@@ -32,6 +40,7 @@ pub(super) struct Account {
     /// The pose that was written last, when the port was lost since: an arm that still stands there settles again.
     doubtful: Option<SettledPose>,
     last_written: Option<SettledPose>,
+    refusals: Refusals,
     /// Follows the board's own, where samples come.
     detector: SettleDetector,
     /// Time and index of the first and the latest sample since the port was last lost.
@@ -41,6 +50,7 @@ pub(super) struct Account {
 impl Account {
     pub(super) fn new(
         robot: Option<RobotOnBoard>,
+        limits: Option<Robot>,
         model: Option<Model>,
         recorder: Option<Recorder>,
         connection: Option<Connection>,
@@ -48,14 +58,19 @@ impl Account {
     ) -> Self {
         Self {
             robot,
+            limits,
+            beyond_limits: 0,
+            said_beyond: Vec::new(),
             model,
             recorder,
             connection,
             withheld: 0,
             doubtful: None,
             last_written: None,
+            refusals: Refusals::default(),
             detector: SettleDetector::new(criteria),
-            tally: StreamTally::default(),
+            losses: StreamLosses::default(),
+            losses_before: StreamLosses::default(),
             latest: Latest::default(),
             samples: 0,
             settled: 0,
@@ -67,13 +82,16 @@ impl Account {
         }
     }
 
-    /// Takes a frame; returns a line to show when a pose has settled.
+    /// Takes a frame; returns a line to show when a pose has settled, and when a message is not believed for the first time. The log
+    /// keeps both as they came.
     pub(super) fn take(&mut self, frame: &Frame) -> Result<Option<String>, CommandError> {
-        let ToHost::Stream(stream) = &frame.message else { return Ok(None) };
         if let Some(recorder) = &mut self.recorder {
             recorder.frame(&frame.bytes).map_err(record_error)?;
         }
-        self.tally.take(stream);
+        let stream = match &frame.message {
+            Ok(stream) => stream,
+            Err(reason) => return Ok(self.refusals.note(*reason)),
+        };
         self.is_homed = self.robot.as_ref().map(|robot| robot.is_homed(stream.homed));
         match &stream.event {
             Event::Samples(batch) => {
@@ -100,6 +118,15 @@ impl Account {
         }
     }
 
+    /// What the link has lost and refused so far.
+    pub(super) fn count_losses(&mut self, of_link: StreamLosses) {
+        self.losses = self.losses_before + of_link;
+    }
+
+    pub(super) fn losses(&self) -> StreamLosses {
+        self.losses
+    }
+
     pub(super) fn take_status(&mut self, status: &Status) {
         self.is_homed = self.robot.as_ref().map(|robot| robot.is_homed_by(status));
         self.latest.take_status(status, self.robot.as_ref(), self.bar_mm());
@@ -108,7 +135,7 @@ impl Account {
     /// The port was lost, or the board reset.
     pub(super) fn lose(&mut self) -> Result<(), CommandError> {
         self.gaps += 1;
-        self.tally.interrupt();
+        self.losses_before = self.losses;
         self.clock = None;
         self.detector.restart();
         self.doubtful = self.last_written.take().or(self.doubtful.take());
@@ -129,8 +156,7 @@ impl Account {
 
     /// Messages and samples lost.
     pub(super) fn lost(&self) -> u64 {
-        let losses = self.tally.losses();
-        losses.missing + losses.overruns
+        self.losses.lost()
     }
 
     /// Measured less computed length, millimetres, where both are known.
@@ -161,8 +187,9 @@ impl Account {
         let (q, displacement_m) = robot.settled(pose);
         let joints = crate::units::joints_text(robot.kinds(), q.as_array());
         let is_homed = robot.is_homed(stream.homed);
+        let beyond = self.take_limits(&q, is_homed);
         let Some(displacement_m) = displacement_m else {
-            return Ok(format!("settled {number}: {joints}, and the bar beyond its travel: no pose"));
+            return Ok(format!("settled {number}: {joints}, and the bar beyond its travel: no pose{beyond}"));
         };
         let displacement_mm = mm_from_m(displacement_m);
         let length = match self.bar_mm() {
@@ -170,7 +197,17 @@ impl Account {
             None => format!("{displacement_mm:+.4} mm from mid travel"),
         };
         let fate = self.keep(pose, q, displacement_m, is_homed)?;
-        Ok(format!("settled {number}: {joints}, {length}, {} samples{fate}", pose.samples))
+        Ok(format!("settled {number}: {joints}, {length}, {} samples{fate}{beyond}", pose.samples))
+    }
+
+    /// A line for every joint that is beyond its limits for the first time. Before the encoders are homed they tell nothing.
+    fn take_limits(&mut self, q: &JointVector<f64>, is_homed: bool) -> String {
+        let Some(robot) = self.limits.as_ref().filter(|_| is_homed) else { return String::new() };
+        let beyond: Vec<BeyondLimits> = robot.beyond_limits(q.as_array()).collect();
+        self.beyond_limits += u64::from(!beyond.is_empty());
+        let new = beyond.into_iter().filter(|beyond| !self.said_beyond.contains(&beyond.joint)).collect::<Vec<_>>();
+        self.said_beyond.extend(new.iter().map(|beyond| beyond.joint));
+        new.iter().map(|beyond| format!("\nwarning: {beyond}: is the board homed where the robot stands?")).collect()
     }
 
     /// Writes a pose, where poses are written, and says when it is not.

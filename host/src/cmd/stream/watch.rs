@@ -26,7 +26,7 @@ pub(super) struct Watch<'a> {
     is_blind: bool,
     asked: Instant,
     began: Instant,
-    /// When the board last said anything.
+    /// When the board last streamed anything that is believed.
     heard: Instant,
 }
 
@@ -58,9 +58,10 @@ const ASK: Duration = Duration::from_millis(250);
 const RETRY: Duration = Duration::from_millis(300);
 
 impl<'a> Watch<'a> {
-    pub(super) fn new(link: BoardLink, args: &'a StreamArgs, account: Account) -> Self {
+    pub(super) fn new(mut link: BoardLink, args: &'a StreamArgs, account: Account) -> Self {
         let now = Instant::now();
         let end = EndRequest::listen();
+        link.heed(end.stop_flag());
         let screen = Screen::open(&end);
         let is_blind = screen.is_steady() && !args.selection().samples;
         Self { args, link: Link::Up(Box::new(link)), account, end, screen, is_blind, asked: now, began: now, heard: now }
@@ -69,7 +70,11 @@ impl<'a> Watch<'a> {
     /// Until the time is over, the poses are there, or the user has had enough.
     pub(super) fn run(&mut self) -> Result<(), CommandError> {
         if let Link::Up(link) = &mut self.link {
-            self.args.start(link)?;
+            match self.args.start(link) {
+                // The loop below sees that the user wants to end.
+                Ok(()) | Err(BoardError::Stopped) => {}
+                Err(error) => return Err(error.into()),
+            }
         }
         while !self.is_done() {
             self.show();
@@ -86,9 +91,12 @@ impl<'a> Watch<'a> {
             }
             let lost = match link.next_frame() {
                 Ok(Some(frame)) => {
-                    self.heard = Instant::now();
-                    if let Some(settled) = self.account.take(&frame)? {
-                        self.screen.note(&settled);
+                    if frame.message.is_ok() {
+                        self.heard = Instant::now();
+                    }
+                    self.account.count_losses(link.losses());
+                    if let Some(words) = self.account.take(&frame)? {
+                        self.screen.note(&words);
                     }
                     None
                 }
@@ -111,14 +119,12 @@ impl<'a> Watch<'a> {
     pub(super) fn finish(mut self) -> Result<StreamReport, CommandError> {
         self.screen.close();
         if let Link::Up(link) = &mut self.link {
-            // What the board had gathered comes before its answer. A board that is gone by now needs no end.
-            let _ = link.act(Command::StopStream);
-            let status = link.request(Command::Status);
-            while let Ok(Some(frame)) = link.next_frame() {
+            // A board that is gone by now needs no end.
+            let _ = link.end_stream();
+            self.account.count_losses(link.losses());
+            // What the board had gathered came before its answer.
+            for frame in link.take_frames() {
                 self.account.take(&frame)?;
-            }
-            if let Ok(Answer::Status(status)) = status {
-                self.account.tally.end(&status);
             }
         }
         let (hello, frames) = match self.link {
@@ -139,7 +145,8 @@ impl<'a> Watch<'a> {
             tool_poses: account.tool_poses,
             poses_written: account.written,
             poses_withheld: account.withheld,
-            losses: account.tally.losses(),
+            beyond_limits: account.limits.as_ref().map(|_| account.beyond_limits),
+            losses: account.losses(),
             frames,
             gaps: account.gaps,
             latest: account.latest,
@@ -174,13 +181,13 @@ impl<'a> Watch<'a> {
 
     fn lose(&mut self, reason: &str) -> Result<(), CommandError> {
         self.screen.note(&format!("{}: the board is away: {reason}; waiting for it", self.args.port.port));
-        self.account.lose()?;
         if let Link::Up(link) = &self.link {
+            self.account.count_losses(link.losses());
             let lost = Link::Lost { hello: Box::new(link.hello().clone()), frames: link.frame_counts().into() };
             // Dropping the old link closes the port, without which it could not be opened again.
             self.link = lost;
         }
-        Ok(())
+        self.account.lose()
     }
 
     /// Tries the port. A port that is away and a board that is silent are waited out; anything else is an error.
@@ -197,6 +204,7 @@ impl<'a> Watch<'a> {
                 self.link = Link::Up(Box::new(link));
                 self.heard = Instant::now();
             }
+            Err(BoardError::Stopped) => {}
             Err(BoardError::Port(_) | BoardError::Silent { .. } | BoardError::NoReply { .. }) => std::thread::sleep(RETRY),
             Err(error) => return Err(error.into()),
         }
@@ -219,7 +227,7 @@ impl<'a> Watch<'a> {
     }
 
     fn regain(&self) -> Result<(BoardLink, Option<RobotAndFrame>), BoardError> {
-        let mut link = BoardLink::connect(&self.args.port.port, self.args.port.baud)?;
+        let mut link = BoardLink::connect_until(&self.args.port.port, self.args.port.baud, self.end.stop_flag())?;
         let robot = RobotOnBoard::read(&mut link)?;
         self.args.start(&mut link)?;
         Ok((link, robot))
@@ -233,7 +241,8 @@ fn ask(link: &mut BoardLink, account: &mut Account) -> Result<Option<String>, Co
             account.take_status(&status);
             Ok(status.streaming.is_none().then(|| "it does not stream any more".into()))
         }
-        Ok(_) => Ok(None),
+        // The loop sees that the user wants to end.
+        Ok(_) | Err(BoardError::Stopped) => Ok(None),
         Err(BoardError::Refused { refusal: Refusal::HelloFirst, .. }) => Ok(Some("it was reset".into())),
         Err(BoardError::Port(PortError::Lost { reason, .. })) => Ok(Some(reason)),
         Err(BoardError::NoReply { .. }) => Ok(Some("it does not answer".into())),

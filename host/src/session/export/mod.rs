@@ -127,7 +127,7 @@ fn tell_all(
             return Err(LogExportError::Interrupted);
         }
         summing.take(&record);
-        teller.take(record, &mut tell)?;
+        teller.take(record, reader.losses(), &mut tell)?;
     }
     Ok(summing.end(reader))
 }

@@ -7,7 +7,7 @@ use super::super::segments::{Segments, unix_ms_of};
 use super::entry::{Entry, Stamp};
 use super::shape::Shape;
 use super::table::{Setting, TableName, Value};
-use crate::board::{RobotOnBoard, StreamTally};
+use crate::board::{RobotOnBoard, StreamLosses};
 
 /// Follows a log.
 pub(super) struct Teller<'a> {
@@ -18,24 +18,33 @@ pub(super) struct Teller<'a> {
     clock: Clock,
     /// What the board of this segment uses, from where it said so.
     robot: Option<RobotOnBoard>,
-    tally: StreamTally,
+    /// As of the record before.
+    losses: StreamLosses,
     row: Vec<Value>,
 }
 
 impl<'a> Teller<'a> {
     pub(super) fn new(shape: &'a Shape) -> Self {
         let clock = Clock { now_us: shape.first_mark_ms.and_then(us_from_ms).unwrap_or(0), ..Clock::default() };
-        let (segments, tally) = (Segments::default(), StreamTally::default());
-        Self { shape, segments, segment: 0, clock, robot: None, tally, row: Vec::new() }
+        let (segments, losses) = (Segments::default(), StreamLosses::default());
+        Self { shape, segments, segment: 0, clock, robot: None, losses, row: Vec::new() }
     }
 
-    /// Takes the next record and tells what it holds.
-    pub(super) fn take<E>(&mut self, record: Record, tell: &mut impl FnMut(&Entry) -> Result<(), E>) -> Result<(), E> {
+    /// Takes the next record and tells what it holds; `losses` are those up to it.
+    pub(super) fn take<E>(
+        &mut self,
+        record: Record,
+        losses: StreamLosses,
+        tell: &mut impl FnMut(&Entry) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let before = std::mem::replace(&mut self.losses, losses);
         if self.segments.begins(&record) {
             self.begin_segment(&record);
         }
-        let Record::Message(message) = record else {
-            return tell(&self.note(true, "a frame is torn or damaged".into()));
+        let message = match record {
+            Record::Message(message) => message,
+            Record::Refused(reason) => return tell(&self.note(true, format!("a message is not believed: {reason}"))),
+            Record::Damaged => return tell(&self.note(true, "a frame is torn or damaged".into())),
         };
         match *message {
             ToHost::Mark(mark) => {
@@ -59,7 +68,7 @@ impl<'a> Teller<'a> {
                 self.robot = RobotOnBoard::new(set);
                 tell(&self.note(false, text))
             }
-            ToHost::Stream(stream) => self.stream(&stream, tell),
+            ToHost::Stream(stream) => self.stream(&stream, before, tell),
         }
     }
 
@@ -67,21 +76,22 @@ impl<'a> Teller<'a> {
     fn begin_segment(&mut self, first: &Record) {
         self.segment += 1;
         self.robot = None;
-        self.tally.interrupt();
         self.clock.begin(match first {
             Record::Message(message) => match **message {
                 ToHost::Mark(mark) => us_from_ms(unix_ms_of(mark)),
                 _ => None,
             },
-            Record::Damaged => None,
+            Record::Refused(_) | Record::Damaged => None,
         });
     }
 
-    fn stream<E>(&mut self, stream: &Stream, tell: &mut impl FnMut(&Entry) -> Result<(), E>) -> Result<(), E> {
-        let before = self.tally.losses();
-        self.tally.take(stream);
-        let after = self.tally.losses();
-        let (missing, overruns) = (after.missing - before.missing, after.overruns - before.overruns);
+    fn stream<E>(
+        &mut self,
+        stream: &Stream,
+        before: StreamLosses,
+        tell: &mut impl FnMut(&Entry) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (missing, overruns) = (self.losses.missing - before.missing, self.losses.overruns - before.overruns);
         if missing + overruns > 0 {
             let text = format!("{missing} messages and {overruns} samples are missing before this");
             let stamp = self.clock.stamp(0, start_us(&stream.event));

@@ -1,0 +1,470 @@
+//! The command against a board that says what cannot be true, and against peers that never finish what they say.
+#![cfg(unix)]
+
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use ballbar::wire::{Answer, BoardHello, Event, MAX_FRAME, PROTOCOL, ResetReason, Stream, ToHost, encode};
+use ballbar_tests::command::{Run, host_cal_command, host_cal_in};
+use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, plant};
+use ballbar_tests::tampered_line::TamperedLine;
+use ballbar_tests::terminal::AtTerminal;
+use host_cal::board::parameter_set;
+use host_cal::files::{Rig, Robot};
+use host_cal::robot_link::JointSpeed;
+use host_cal::simulate::Shells;
+use host_cal::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
+use serialport::{SerialPort, TTYPort};
+use tempfile::TempDir;
+
+/// A board that is ready, and whose robot visits so many poses as soon as a host streams.
+fn board(poses: usize) -> VirtualBoard {
+    let (truth, design) = (Robot::open("puma560-optimised").unwrap(), Robot::open("puma560").unwrap());
+    let rig = Rig::open("triangles").unwrap();
+    let pairings = rig.all_pairings();
+    let shells = Shells {
+        planned_with: &design,
+        truth: &truth,
+        rig: &rig,
+        pairings: &pairings[..1],
+        bar_m: 0.46,
+        per_pairing: poses,
+        sigma_m: 84e-6,
+        seed: 7,
+    };
+    let speed = JointSpeed { revolute_rad_s: 20.0, ..JointSpeed::default() };
+    let script = Script::from_shells(&shells, 0.7, speed, || ()).unwrap();
+    let plant = Plant::new(&truth, 0.075, 7).unwrap();
+    let parameters = Some(parameter_set(&design, plant.lvdt()).unwrap());
+    let options = VirtualBoardOptions { parameters, is_homed: true, ..VirtualBoardOptions::new(plant, Pace::Real) };
+    let mut board = VirtualBoard::start(options).unwrap();
+    board.play_with_stream(script);
+    board
+}
+
+/// What is made of the nth pose that settles.
+type Change = fn(Stream, &[Stream]) -> Vec<Stream>;
+
+/// A line on which the poses that settle are changed, each in its turn, and nothing else.
+fn line(board: &VirtualBoard, changes: &'static [Change]) -> TamperedLine {
+    let mut past: Vec<Stream> = Vec::new();
+    TamperedLine::start(board.port(), move |message| match message {
+        ToHost::Stream(stream) if matches!(stream.event, Event::Settled(_)) => {
+            let sent = match changes.get(past.len()) {
+                Some(change) => change(stream.clone(), &past),
+                None => vec![stream.clone()],
+            };
+            past.push(stream);
+            sent.into_iter().map(ToHost::Stream).collect()
+        }
+        other => vec![other],
+    })
+}
+
+fn with(mut stream: Stream, change: impl FnOnce(&mut ballbar::SettledPose)) -> Stream {
+    if let Event::Settled(pose) = &mut stream.event {
+        change(pose);
+    }
+    stream
+}
+
+fn record(folder: &Path, line: &TamperedLine, poses: &str) -> Run {
+    let args =
+        ["--session", "s", "--rig", "triangles", "--pairing", "A:1", "--bar", "460", "--poses", poses, "--for", "60s", "--json"];
+    host_cal_in(folder, &[&["stream", line.port()], &args[..]].concat())
+}
+
+fn rows(folder: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.join("s/poses.csv")).unwrap();
+    text.lines().skip(1).map(str::to_owned).collect()
+}
+
+fn distinct(rows: &[String]) -> usize {
+    rows.iter().collect::<std::collections::BTreeSet<_>>().len()
+}
+
+#[test]
+fn false_poses_beside_true_ones_are_refused_kept_in_the_log_and_never_written() {
+    const CHANGES: &[Change] = &[
+        |s, _| vec![s.clone(), s.clone(), s],
+        |s, _| vec![with(s.clone(), |pose| pose.counts_mean[0] = f64::NAN), s],
+        |s, _| vec![with(s.clone(), |pose| (pose.counts_mean.truncate(2), pose.counts_std.truncate(2)).0), s],
+        |s, _| vec![with(s.clone(), |pose| pose.code_mean = 1e300), s],
+        |s, _| vec![Stream { sequence: s.sequence.wrapping_add(1 << 31), ..s.clone() }, s],
+        |s, past| vec![s, past[0].clone()],
+        |s, _| vec![with(s.clone(), |pose| pose.t_us = u64::MAX), s],
+    ];
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let board = board(20);
+    let line = line(&board, CHANGES);
+    let run = record(folder, &line, "8");
+    assert_eq!(run.code, 1, "{}", run.transcript());
+    let report = run.json();
+    assert_eq!((report["settled"].as_u64(), report["poses_written"].as_u64()), (Some(8), Some(8)));
+    let refused = serde_json::json!({"wrong_count": 1, "not_finite": 1, "out_of_range": 2, "went_back": 1, "repeated": 3});
+    assert_eq!((&report["losses"]["refused"], &report["losses"]["missing"]), (&refused, &0.into()), "{report}");
+    assert!(run.stderr.contains("a message of the board is not believed: 2 encoders instead of 6"), "{}", run.stderr);
+    let rows = rows(folder);
+    assert_eq!((rows.len(), distinct(&rows)), (8, 8));
+    assert!(rows.iter().all(|row| !row.contains("NaN") && !row.contains(",0.000000000,0.000000000,0.000000000,")), "{rows:?}");
+
+    // The log has all that came, and who reads it believes no more of it.
+    let check = host_cal_in(folder, &["log", "check", "s", "--json"]);
+    assert_eq!((check.code, &check.json()["losses"]["refused"]), (1, &refused), "{}", check.transcript());
+    let exported = host_cal_in(folder, &["log", "export", "s", "--csv", "s.csv", "--mcap", "s.mcap", "--json"]);
+    assert_eq!((exported.code, &exported.json()["losses"]["refused"]), (1, &refused), "{}", exported.transcript());
+    assert_eq!(exported.json()["settled"], 8);
+    assert!(exported.stderr.contains("REFUSED: 8 messages that cannot be true"), "{}", exported.stderr);
+    let mcap = std::fs::read(folder.join("s.mcap")).unwrap();
+    let mcap = String::from_utf8_lossy(&mcap);
+    assert!(mcap.contains("a message is not believed: 2 encoders instead of 6") && !mcap.contains("\"code_mean\":null"));
+}
+
+#[test]
+fn poses_that_came_false_are_lost_and_end_the_command_otherwise_than_well() {
+    const CHANGES: &[Change] = &[
+        |s, _| vec![s],
+        |s, _| vec![with(s, |pose| (pose.counts_mean.truncate(2), pose.counts_std.truncate(2)).0)],
+        |s, _| vec![with(s, |pose| pose.counts_std[2] = f32::NAN)],
+    ];
+    let folder = TempDir::new().unwrap();
+    let board = board(20);
+    let line = line(&board, CHANGES);
+    let run = record(folder.path(), &line, "3");
+    assert_eq!(run.code, 1, "{}", run.transcript());
+    let losses = &run.json()["losses"];
+    assert_eq!(
+        (&losses["missing"], &losses["refused"]["wrong_count"], &losses["refused"]["not_finite"]),
+        (&0.into(), &1.into(), &1.into())
+    );
+    assert_eq!(rows(folder.path()).len(), 3, "those that are true are written");
+}
+
+#[test]
+fn messages_that_only_come_twice_cost_nothing() {
+    const CHANGES: &[Change] = &[|s, _| vec![s.clone(), s], |s, past| vec![past[0].clone(), s.clone(), s]];
+    let folder = TempDir::new().unwrap();
+    let board = board(20);
+    let line = line(&board, CHANGES);
+    let run = record(folder.path(), &line, "3");
+    assert_eq!((run.code, &run.json()["losses"]["refused"]["repeated"]), (0, &3.into()), "{}", run.transcript());
+    let rows = rows(folder.path());
+    assert_eq!((rows.len(), distinct(&rows)), (3, 3));
+}
+
+#[test]
+fn no_command_prints_what_cannot_be_true() {
+    let folder = TempDir::new().unwrap();
+    let board = board(1);
+    type Spoil = fn(&mut Answer);
+    let cases: [(&str, Spoil, &str); 6] = [
+        (
+            "pose",
+            |a| {
+                if let Answer::CurrentPose(pose) = a {
+                    pose.q[3] = f32::NAN
+                }
+            },
+            "a joint value is not a finite number",
+        ),
+        (
+            "pose",
+            |a| {
+                if let Answer::CurrentPose(pose) = a {
+                    pose.q.truncate(2)
+                }
+            },
+            "2 joint values instead of 6",
+        ),
+        (
+            "pose",
+            |a| {
+                if let Answer::CurrentPose(pose) = a {
+                    pose.pose.position_m = [f32::INFINITY; 3]
+                }
+            },
+            "the tool's position is not a finite",
+        ),
+        (
+            "pose",
+            |a| {
+                if let Answer::CurrentPose(pose) = a {
+                    pose.pose.position_m[1] = 3.4e38
+                }
+            },
+            "the tool's position is out of range",
+        ),
+        (
+            "pose",
+            |a| {
+                if let Answer::Parameters(set) = a {
+                    set.parameters[6] = f32::NAN
+                }
+            },
+            "its parameters cannot be used",
+        ),
+        (
+            "status",
+            |a| {
+                if let Answer::Status(status) = a {
+                    status.encoders.truncate(1)
+                }
+            },
+            "1 encoders instead of 6",
+        ),
+    ];
+    for (command, spoil, words) in cases {
+        let line = TamperedLine::start(board.port(), move |mut message| {
+            if let ToHost::Reply(reply) = &mut message
+                && let Ok(answer) = &mut reply.outcome
+            {
+                spoil(answer);
+            }
+            vec![message]
+        });
+        for json in [&[][..], &["--json"]] {
+            let run = host_cal_in(folder.path(), &[&[command, line.port()], json].concat());
+            let message = run.stderr.split_whitespace().collect::<Vec<_>>().join(" ").replace("│ ", "");
+            assert!(run.code == 2 && run.stdout.is_empty() && message.contains(words), "{words}: {}", run.transcript());
+        }
+    }
+}
+
+/// A serial port at whose other end bytes come one by one, for ever, at a distance.
+struct Dribble {
+    name: String,
+    is_stopped: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Dribble {
+    /// First a beginning at once, then the same bytes again and again, `step` at a time.
+    fn start(beginning: Vec<u8>, bytes: Vec<u8>, step: usize, pause: Duration) -> Self {
+        let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+        let name = slave.name().expect("it has a name");
+        drop(slave);
+        let is_stopped = Arc::new(AtomicBool::new(false));
+        let stop = Arc::clone(&is_stopped);
+        let thread = std::thread::spawn(move || {
+            master.set_timeout(Duration::from_millis(5)).expect("a timeout");
+            let mut heard = [0; 256];
+            let mut is_begun = false;
+            let mut rest = bytes.iter().copied().cycle();
+            while !stop.load(Ordering::Relaxed) {
+                // Every hello is answered with the beginning.
+                if master.read(&mut heard).is_ok() && !std::mem::replace(&mut is_begun, true) {
+                    let _ = master.write_all(&beginning);
+                }
+                let next: Vec<u8> = rest.by_ref().take(step).collect();
+                let _ = master.write(&next);
+                std::thread::sleep(pause);
+            }
+        });
+        Self { name, is_stopped, thread: Some(thread) }
+    }
+}
+
+impl Drop for Dribble {
+    fn drop(&mut self) {
+        self.is_stopped.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn hello_frame() -> Vec<u8> {
+    let hello = BoardHello {
+        version: PROTOCOL,
+        firmware: "0.9.1".try_into().unwrap(),
+        board: "test".try_into().unwrap(),
+        unique_id: [7; 12],
+        encoders: 6,
+        rate_min_hz: 100,
+        rate_max_hz: 5_000,
+        encoder_skew_ns: 0,
+        lvdt_delay_ns: 0,
+        uptime_us: 5,
+        reset: ResetReason::PowerOn,
+        active: None,
+    };
+    encode(&ToHost::Hello(hello), &mut [0; MAX_FRAME]).unwrap().to_vec()
+}
+
+/// Longer than five tries of 0.8 s on a busy machine, far shorter than any of these peers would talk.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+#[test]
+fn a_board_that_never_finishes_its_answer_is_given_up() {
+    let folder = TempDir::new().unwrap();
+    let slow = Duration::from_millis(100);
+    let peers = [
+        ("a byte at a time", Dribble::start(Vec::new(), hello_frame()[..20].to_vec(), 1, slow), "no board answers"),
+        ("no end of a frame", Dribble::start(Vec::new(), vec![7; 100], 2_000, Duration::from_millis(1)), "no board answers"),
+        ("nothing but zeros", Dribble::start(Vec::new(), vec![0; 100], 2_000, Duration::from_millis(1)), "no board answers"),
+        ("hellos and no answers", Dribble::start(hello_frame(), hello_frame(), 500, Duration::from_millis(1)), "did not answer"),
+        ("a hello, then a byte at a time", Dribble::start(hello_frame(), vec![3, 1], 1, slow), "did not answer"),
+    ];
+    for (what, peer, words) in &peers {
+        let began = Instant::now();
+        let run = host_cal_in(folder.path(), &["status", &peer.name]);
+        assert!(run.code == 2 && run.stderr.contains(words) && began.elapsed() < PATIENCE, "{what}: {}", run.transcript());
+    }
+}
+
+/// Asks a process to end, as Ctrl-C does; how long it takes.
+fn end_of(mut child: Child) -> (Option<i32>, Duration) {
+    let began = Instant::now();
+    let status = std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    assert!(status.expect("there is a kill").success());
+    loop {
+        if let Some(status) = child.try_wait().expect("a child") {
+            return (status.code(), began.elapsed());
+        }
+        if began.elapsed() > PATIENCE {
+            let _ = child.kill();
+            panic!("it does not end");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn a_signal_ends_a_recording_promptly_while_the_board_is_silent_or_talks_for_ever() {
+    for falls_silent in [true, false] {
+        let folder = TempDir::new().unwrap();
+        let folder = folder.path();
+        let board = board(20);
+        let is_off = Arc::new(AtomicBool::new(false));
+        let off = Arc::clone(&is_off);
+        let line = TamperedLine::start(board.port(), move |message| match (off.load(Ordering::Relaxed), falls_silent) {
+            (false, _) => vec![message],
+            (true, true) => Vec::new(),
+            // Its stream goes on, and nothing that is asked is answered.
+            (true, false) if matches!(message, ToHost::Stream(_)) => vec![message; 3],
+            (true, false) => Vec::new(),
+        });
+        let args = ["stream", line.port(), "--session", "s", "--pairing", "A:1", "--bar", "460", "--json"];
+        let child = host_cal_command(folder, &args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let began = Instant::now();
+        while !folder.join("s/poses.csv").is_file() {
+            assert!(began.elapsed() < PATIENCE, "no pose");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        is_off.store(true, Ordering::Relaxed);
+        // Into the midst of asking the board how it is.
+        std::thread::sleep(Duration::from_millis(1_500));
+        let (code, took) = end_of(child);
+        assert!(code.is_some_and(|code| code < 2) && took < Duration::from_secs(3), "{code:?} after {took:?}");
+        let description = std::fs::read_to_string(folder.join("s/session.toml")).unwrap();
+        assert!(description.contains("ended = "), "{description}");
+        assert!(std::fs::read_to_string(folder.join("s/poses.csv")).unwrap().ends_with('\n'));
+    }
+}
+
+/// A way to an address on which, once the flag is set, nothing comes back but a byte now and then.
+fn dribbling_way(address: String, is_dribbling: Arc<AtomicBool>) -> String {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let here = listener.local_addr().unwrap().to_string();
+    std::thread::spawn(move || {
+        for client in listener.incoming().flatten() {
+            let server = std::net::TcpStream::connect(&address).expect("the controller listens");
+            for stream in [&client, &server] {
+                stream.set_nodelay(true).expect("a connection");
+            }
+            let (mut from_client, mut to_server) = (client.try_clone().unwrap(), server.try_clone().unwrap());
+            std::thread::spawn(move || std::io::copy(&mut from_client, &mut to_server));
+            let (mut from_server, mut to_client) = (server, client);
+            let dribbles = Arc::clone(&is_dribbling);
+            std::thread::spawn(move || {
+                let mut bytes = [0; 4096];
+                while let Ok(count @ 1..) = from_server.read(&mut bytes) {
+                    while dribbles.load(Ordering::Relaxed) && to_client.write_all(b"x").is_ok() {
+                        std::thread::sleep(Duration::from_millis(200));
+                    }
+                    if to_client.write_all(&bytes[..count]).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+    });
+    here
+}
+
+#[test]
+fn a_signal_ends_a_collection_promptly_while_the_controller_sends_a_byte_now_and_then() {
+    let cell = SimulatedCell::start(plant(3), 7e-5, &SHORT_PLAN);
+    let is_dribbling = Arc::new(AtomicBool::new(false));
+    let way = dribbling_way(cell.address.clone(), Arc::clone(&is_dribbling));
+    let mut args = cell.collect_args("session");
+    let at = args.iter().position(|arg| *arg == cell.address).unwrap();
+    args[at] = way;
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let mut command = host_cal_command(cell.folder.path(), &args);
+    let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let began = Instant::now();
+    while !cell.path("session/poses.csv").is_file() {
+        assert!(began.elapsed() < PATIENCE, "no pose");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    is_dribbling.store(true, Ordering::Relaxed);
+    std::thread::sleep(Duration::from_millis(700));
+    let (code, took) = end_of(child);
+    assert!(code == Some(1) && took < Duration::from_secs(3), "{code:?} after {took:?}");
+    let description = std::fs::read_to_string(cell.path("session/session.toml")).unwrap();
+    assert!(description.contains("ended = "), "{description}");
+    // The same command goes on from there.
+    is_dribbling.store(false, Ordering::Relaxed);
+    let run = cell.collect("session", &["--json"]);
+    assert_eq!(run.code, 0, "{}", run.transcript());
+    cell.assert_all_measured("session");
+}
+
+#[test]
+fn lvdt_ends_with_ctrl_c_alone() {
+    let folder = TempDir::new().unwrap();
+    let board = board(1);
+    let args = ["lvdt", board.port(), "--bar", "460", "--lengths", "425,440,455,470,485,495"];
+    let mut terminal = AtTerminal::start(folder.path(), &args, (100, 30));
+    terminal.wait_for("press Enter when it stands");
+    let began = Instant::now();
+    terminal.press("\u{3}");
+    let (code, text) = terminal.finish();
+    assert!(code == 130 && text.contains("ended before all lengths were measured: 0 of 6"), "{code}: {text}");
+    assert!(began.elapsed() < Duration::from_secs(3), "{:?}", began.elapsed());
+    let status = host_cal_in(folder.path(), &["status", board.port(), "--json"]).json();
+    assert_eq!(status["streaming"], false);
+}
+
+#[test]
+fn joints_beyond_the_limits_are_warned_of_where_these_are_known() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let board = board(20);
+    let home = |q: &str, more: &[&str]| host_cal_in(folder, &[&["home", board.port(), "--q", q, "--json"], more].concat());
+    let unknown = home("0,0,0,0,0,0", &[]);
+    assert!(unknown.code == 0 && unknown.json()["beyond_limits"].is_null(), "{}", unknown.transcript());
+    let within = home("0,0,0,0,0,0", &["--robot", "puma560"]);
+    assert_eq!((within.code, &within.json()["beyond_limits"]), (0, &serde_json::json!([])), "{}", within.transcript());
+    let other = home("0,0,0,0,0,0", &["--robot", "scara"]);
+    assert!(other.code == 2 && other.stderr.contains("has 4 joints, the board's robot 6"), "{}", other.transcript());
+    let beyond = home("170,0,0,0,0,0", &["--robot", "puma560"]);
+    assert!(beyond.code == 0 && beyond.stderr.contains("joint 1 at 170 deg is beyond its limits"), "{}", beyond.transcript());
+
+    // Its robot stood at zero in truth: wherever it goes, joint 1 is told to be beyond its limits.
+    assert_eq!(home("350,0,0,0,0,0", &[]).code, 0);
+    let stream = |more: &[&str]| {
+        let args = ["stream", board.port(), "--settled", "--poses", "2", "--for", "60s", "--json"];
+        host_cal_in(folder, &[&args[..], more].concat())
+    };
+    let run = stream(&["--robot", "puma560"]);
+    assert!(run.json()["beyond_limits"].as_u64() >= Some(1), "{}", run.transcript());
+    assert!(run.stderr.contains("is the board homed where the robot stands?"), "{}", run.stderr);
+    assert!(stream(&[]).json()["beyond_limits"].is_null());
+}
