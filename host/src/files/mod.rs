@@ -15,6 +15,7 @@ mod robot;
 mod solids;
 mod source;
 mod targets;
+mod temporary;
 mod urdf;
 mod write;
 

@@ -8,6 +8,7 @@ use miette::Diagnostic;
 use tempfile::NamedTempFile;
 use thiserror::Error;
 
+use super::temporary;
 use crate::platform;
 
 /// A file could not be written; what stood there before still stands there.
@@ -140,13 +141,10 @@ impl Target {
     /// The file to write before: in the same folder, so that it can be renamed.
     fn temporary(&self) -> IoResult<NamedTempFile> {
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".host-cal-");
         let Some(permissions) = &self.permissions else {
-            platform::with_usual_permissions(&mut builder);
-            return builder.tempfile_in(folder);
+            return temporary::create_in(folder, platform::with_usual_permissions);
         };
-        let file = builder.tempfile_in(folder)?;
+        let file = temporary::create_in(folder, |_| ())?;
         file.as_file().set_permissions(permissions.clone())?;
         Ok(file)
     }

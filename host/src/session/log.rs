@@ -5,13 +5,16 @@
 //! begins with a zero that ends the torn frame, and the reader counts it.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use ballbar::wire::{FrameReader, LogMark, MAX_FRAME, PROTOCOL, ProtocolVersion, ToHost, decode, encode};
 use miette::Diagnostic;
+use same_file::Handle;
 use thiserror::Error;
+
+use super::pose_mark::PoseMark;
 
 /// Why a log cannot be read or written.
 #[derive(Debug, Error, Diagnostic)]
@@ -25,6 +28,15 @@ pub enum LogError {
         doing: &'static str,
         /// Its reason.
         error: std::io::Error,
+    },
+    /// Another program has done something to the file that is being written.
+    #[error("{}: another program has {what} it while this one recorded", path.display())]
+    #[diagnostic(help("What was measured until then is in poses.csv. Run the same command again to go on."))]
+    Displaced {
+        /// The file.
+        path: PathBuf,
+        /// What.
+        what: &'static str,
     },
     /// The file is something else.
     #[error("{}: no log of a session: it does not begin with `BBL1`", path.display())]
@@ -64,6 +76,10 @@ fn header() -> [u8; HEADER_BYTES] {
 pub struct LogWriter {
     path: PathBuf,
     file: File,
+    /// The same, to be known again.
+    handle: Handle,
+    /// Length of the file by what was written.
+    length: u64,
     /// A frame could not be written whole: the next one must not be taken for its rest.
     is_torn: bool,
 }
@@ -77,16 +93,19 @@ impl LogWriter {
         let io = |doing| move |error| LogError::Io { path: path.to_owned(), doing, error };
         let mut file =
             OpenOptions::new().read(true).append(true).create(true).open(path).map_err(io("cannot be opened for writing"))?;
-        let length = file.seek(SeekFrom::End(0)).map_err(io("cannot be read"))?;
-        if length == 0 {
-            file.write_all(&header()).map_err(io("cannot be written"))?;
+        let mut begun = Vec::new();
+        Read::by_ref(&mut file).take(HEADER_BYTES as u64).read_to_end(&mut begun).map_err(io("cannot be read"))?;
+        if begun.len() < HEADER_BYTES && header().starts_with(&begun) {
+            // A new file, or one whose program was killed before it had begun.
+            file.write_all(&header()[begun.len()..]).map_err(io("cannot be written"))?;
         } else {
-            file.seek(SeekFrom::Start(0)).map_err(io("cannot be read"))?;
-            check_header(&mut file, path)?;
+            check_header(&mut begun.as_slice(), path)?;
             // Ends the frame that a killed program may have left torn; after a whole one it changes nothing.
             file.write_all(&[0]).map_err(io("cannot be written"))?;
         }
-        let mut writer = Self { path: path.to_owned(), file, is_torn: false };
+        let handle = file.try_clone().and_then(Handle::from_file).map_err(io("cannot be read"))?;
+        let length = file.metadata().map_err(io("cannot be read"))?.len();
+        let mut writer = Self { path: path.to_owned(), file, handle, length, is_torn: false };
         writer.mark(LogMark::Opened { unix_ms: unix_ms() })?;
         Ok(writer)
     }
@@ -98,11 +117,15 @@ impl LogWriter {
     pub fn frame(&mut self, bytes: &[u8]) -> Result<(), LogError> {
         let torn = if self.is_torn { self.file.write_all(&[0]) } else { Ok(()) };
         let written = torn.and_then(|()| self.file.write_all(bytes));
+        self.length += u64::from(self.is_torn) + bytes.len() as u64;
         self.is_torn = written.is_err();
+        if self.is_torn {
+            self.length = self.file.metadata().map_or(0, |metadata| metadata.len());
+        }
         written.map_err(|error| LogError::Io { path: self.path.clone(), doing: "cannot be written", error })
     }
 
-    /// Notes that the port was lost or is back.
+    /// Notes that recording begins, or that the port was lost or is back.
     ///
     /// # Errors
     /// [`LogError::Io`].
@@ -112,12 +135,35 @@ impl LogWriter {
         self.frame(&frame)
     }
 
+    /// Notes something of poses.
+    ///
+    /// # Errors
+    /// [`LogError::Io`].
+    pub fn pose_mark(&mut self, mark: &PoseMark) -> Result<(), LogError> {
+        self.frame(&mark.frame().unwrap_or_default())
+    }
+
     /// Asks the disk to keep what was written, for when the power fails.
     ///
     /// # Errors
     /// [`LogError::Io`].
     pub fn sync(&self) -> Result<(), LogError> {
         self.file.sync_data().map_err(|error| LogError::Io { path: self.path.clone(), doing: "cannot be written", error })
+    }
+
+    /// Whether the file still is where it was opened, with all that was written: on many systems a file that was removed or replaced
+    /// can be written as if nothing had happened.
+    ///
+    /// # Errors
+    /// [`LogError::Displaced`].
+    pub fn check_place(&self) -> Result<(), LogError> {
+        let what = match Handle::from_path(&self.path) {
+            Ok(handle) if handle != self.handle => "put another file in the place of",
+            Ok(_) if self.file.metadata().is_ok_and(|metadata| metadata.len() < self.length) => "cut short",
+            Ok(_) => return Ok(()),
+            Err(_) => "removed",
+        };
+        Err(LogError::Displaced { path: self.path.clone(), what })
     }
 }
 
@@ -131,6 +177,8 @@ pub(crate) fn unix_ms() -> u64 {
 pub enum Record {
     /// A whole frame.
     Message(Box<ToHost>),
+    /// What the host noted of poses.
+    Mark(PoseMark),
     /// A frame that is torn or damaged.
     Damaged,
 }
@@ -145,6 +193,11 @@ pub struct LogReader {
 }
 
 impl LogReader {
+    /// Whether there is a log in a session's directory to read; a header that was not written to its end is none yet.
+    pub(super) fn is_begun(session: &Path) -> bool {
+        std::fs::metadata(session.join(super::LOG_NAME)).is_ok_and(|log| log.len() >= HEADER_BYTES as u64)
+    }
+
     /// Opens a log, or the log in a session's directory.
     ///
     /// # Errors
@@ -179,7 +232,8 @@ impl LogReader {
                 None => {}
                 Some(Ok(payload)) => {
                     let message = decode(payload).map(|message| Record::Message(Box::new(message)));
-                    return Ok(Some(message.unwrap_or(Record::Damaged)));
+                    let mark = || PoseMark::of_payload(payload).map(Record::Mark);
+                    return Ok(Some(message.or_else(mark).unwrap_or(Record::Damaged)));
                 }
                 Some(Err(_)) => return Ok(Some(Record::Damaged)),
             }

@@ -13,7 +13,7 @@ use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
 use crate::cmd::outcome::CommandError;
 use crate::cmd::port::EndRequest;
 use crate::cmd::screen::{Key, Screen};
-use crate::session::BoardDescription;
+use crate::session::{BoardDescription, Recorder};
 
 /// One run of `stream`.
 pub(super) struct Watch<'a> {
@@ -107,15 +107,16 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Ends the stream and the session, and says what came of it.
-    pub(super) fn finish(mut self) -> Result<StreamReport, CommandError> {
+    /// Ends the stream and the session, and says what came of it and whether all could be written.
+    pub(super) fn finish(mut self) -> (StreamReport, Result<(), CommandError>) {
         self.screen.close();
+        let mut written = Ok(());
         if let Link::Up(link) = &mut self.link {
             // What the board had gathered comes before its answer. A board that is gone by now needs no end.
             let _ = link.act(Command::StopStream);
             let status = link.request(Command::Status);
             while let Ok(Some(frame)) = link.next_frame() {
-                self.account.take(&frame)?;
+                written = written.and(self.account.take(&frame).map(drop));
             }
             if let Ok(Answer::Status(status)) = status {
                 self.account.tally.end(&status);
@@ -138,6 +139,7 @@ impl<'a> Watch<'a> {
             settled: account.settled,
             tool_poses: account.tool_poses,
             poses_written: account.written,
+            poses_recovered: account.recorder.as_ref().map_or(0, Recorder::recovered),
             poses_withheld: account.withheld,
             losses: account.tally.losses(),
             frames,
@@ -145,8 +147,8 @@ impl<'a> Watch<'a> {
             latest: account.latest,
             session: self.args.session.as_ref().map(|session| session.display().to_string()),
         };
-        account.recorder.map_or(Ok(()), |recorder| recorder.end()).map_err(record_error)?;
-        Ok(report)
+        let ended = account.recorder.map_or(Ok(()), Recorder::end).map_err(record_error);
+        (report, written.and(ended))
     }
 
     fn is_done(&self) -> bool {

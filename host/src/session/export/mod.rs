@@ -23,14 +23,14 @@ use thiserror::Error;
 
 use super::log::{LogError, LogReader};
 use super::summary::{LogSummary, Summing};
-use super::{DESCRIPTION_NAME, PLAN_NAME, POSES_NAME, RIG_NAME, ROBOT_NAME};
+use super::{DESCRIPTION_NAME, LOCK_NAME, PLAN_NAME, POSES_NAME, RIG_NAME, ROBOT_NAME};
 use crate::files::{PendingFile, WriteError, commit_all};
 use entry::{Entry, Writer};
 use shape::Shape;
 use teller::Teller;
 
 /// Files of a session beside its log.
-const SESSION_NAMES: [&str; 5] = [DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME];
+const SESSION_NAMES: [&str; 6] = [DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME, LOCK_NAME];
 
 /// A format that a log can be exported to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
