@@ -13,7 +13,7 @@ use host_cal::files::{PairingId, PlanRow, Rig, Robot, Source, read_plan, write_p
 use host_cal::plan::{Cell, Grid, Margins, Pace as PlanPace, PlanOptions, plan};
 use host_cal::robot_link::RobotLink;
 use host_cal::robot_link::sim::{SimHand, SimLink};
-use host_cal::session::{Recorder, Run};
+use host_cal::session::{Recorder, Run, SessionLock};
 use host_cal::virtual_board::{
     Controller, ControllerOptions, Driven, Driver, Pace, Plant, VirtualBoard, VirtualBoardOptions, driver,
 };
@@ -193,7 +193,8 @@ impl<Board> SimulatedCell<Board> {
         let mut board = BoardLink::connect(port, BAUD).expect("the board answers");
         let (robot, _) = RobotOnBoard::read(&mut board).expect("the board answers").expect("it holds parameters");
         let run = Run::beginning("port", board.hello(), 200);
-        let recorder = Recorder::begin(&self.path(session), run, Some(robot.kinds())).expect("the session can be written");
+        let lock = SessionLock::acquire(&self.path(session)).expect("nobody else writes");
+        let recorder = Recorder::begin(&lock, run, Some(robot.kinds())).expect("the session can be written");
         let ledger = Ledger::new(&rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let criteria = StillnessCriteria { hold_us: 200_000, ..StillnessCriteria::default() };
         let board = BoardWatch::begin(board, robot, recorder, 200, criteria).expect("the board streams");

@@ -83,7 +83,7 @@ fn frames(session: &Path) -> (usize, usize) {
     let (mut whole, mut damaged) = (0, 0);
     while let Some(record) = reader.next_record().expect("readable") {
         match record {
-            Record::Message(_) => whole += 1,
+            Record::Message(_) | Record::Mark(_) => whole += 1,
             Record::Refused(reason) => panic!("a message that the board sent is not believed: {reason}"),
             Record::Damaged => damaged += 1,
         }

@@ -19,7 +19,7 @@ use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::port::{EndRequest, PortArgs, StillnessArgs};
 use super::report::print;
-use super::stream::record_error;
+use super::stream::{lock_error, record_error, say_recovered};
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, check_board, remove_lag,
@@ -28,7 +28,7 @@ use crate::files::PlanRow;
 use crate::plan::{Cell, Margins, Pace, check};
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
-use crate::session::{Recorder, Run};
+use crate::session::{Recorder, Run, SessionLock};
 use crate::units::m_from_mm;
 use mover::{Mover, MoverArgs};
 use operator::{Hand, Terminal};
@@ -166,9 +166,11 @@ impl CollectArgs {
         if let Answer::Status(status) = link.request(Command::Status)? {
             check_board(&files.robot, &robot.0, robot.0.is_homed_by(&status))?;
         }
+        let lock = SessionLock::acquire(&self.session).map_err(lock_error)?;
         files.write()?;
         let guide = self.guide(&mover, &files, &options)?;
-        let recorder = self.recorder(&link, &robot, &mover)?;
+        let recorder = self.recorder(&lock, &link, &robot, &mover)?;
+        let recovered = recorder.recovered();
         let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let mut board =
             BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
@@ -189,7 +191,8 @@ impl CollectArgs {
         let (summary, ledger, closed) = collector.end();
         terminal.close();
         let mut report = CollectReport::new(&self.session, &files, &ledger, &summary, &ended, began.elapsed());
-        let lag = remove_lag(&self.session, &files.robot, &files.rig);
+        report.set_recovered(recovered);
+        let lag = remove_lag(&lock, &files.robot, &files.rig);
         if let Ok(Some(lag)) = &lag {
             report.set_lag(lag);
         }
@@ -250,6 +253,7 @@ impl CollectArgs {
 
     fn recorder(
         &self,
+        lock: &SessionLock,
         link: &BoardLink,
         (robot, frame): &(RobotOnBoard, Vec<u8>),
         mover: &Mover,
@@ -260,7 +264,8 @@ impl CollectArgs {
             temperature_c: self.temperature_c,
             ..Run::beginning(link.port_name(), link.hello(), self.rate)
         };
-        let mut recorder = Recorder::begin(&self.session, run, Some(robot.kinds())).map_err(record_error)?;
+        let mut recorder = Recorder::begin(lock, run, Some(robot.kinds())).map_err(record_error)?;
+        say_recovered(&recorder);
         recorder.frame(link.hello_frame()).map_err(record_error)?;
         recorder.frame(frame).map_err(record_error)?;
         Ok(recorder)

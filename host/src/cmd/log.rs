@@ -1,6 +1,7 @@
-//! `host-cal log`: check and export the log of a session.
+//! `host-cal log`: check, recover and export what the log of a session holds.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -9,11 +10,16 @@ use super::inputs::{ForceArgs, OutputArgs};
 use super::outcome::{CommandError, INTERRUPTED, Outcome};
 use super::port::EndRequest;
 use super::report::{Report, print, warn};
+use super::stream::{lock_error, record_error};
 use crate::board::StreamLosses;
-use crate::session::{LogExportError, LogFormat, LogReader, LogSummary, export_log};
+use crate::session::{
+    DESCRIPTION_NAME, LOG_NAME, LogExportError, LogFormat, LogReader, LogSummary, LoggedPose, LoggedPoses, SessionLock,
+    export_log, missing_poses, recover,
+};
 use crate::text::{one_line, shown_path};
+use crate::units::{mm_from_m, tidy};
 
-/// Check or export the log of a session (stream.bbl)
+/// Check, recover or export the log of a session (stream.bbl)
 #[derive(Args)]
 pub(super) struct LogArgs {
     #[command(subcommand)]
@@ -22,10 +28,20 @@ pub(super) struct LogArgs {
 
 #[derive(Subcommand)]
 enum LogCommand {
-    /// Read a log to its end and say what it holds and what it lacks
+    /// Read a log to its end and say what it holds and what it lacks, and which of its poses poses.csv lacks
     #[command(after_help = "Example:\n  host-cal log check today\n\nExit code 1 when something is missing or damaged.")]
     Check {
         /// A session's directory, or its stream.bbl
+        session: PathBuf,
+        #[command(flatten)]
+        output: OutputArgs,
+    },
+    /// Write the poses that a log holds and poses.csv lacks into it, as the next recording would
+    #[command(
+        after_help = "Example:\n  host-cal log recover today\n\nPoses that were erased stay so; to take another one out for good, put # before its line in poses.csv."
+    )]
+    Recover {
+        /// A session's directory
         session: PathBuf,
         #[command(flatten)]
         output: OutputArgs,
@@ -69,6 +85,36 @@ struct CheckReport {
     log: String,
     #[serde(flatten)]
     summary: LogSummary,
+    /// Of a log in its session.
+    #[serde(flatten)]
+    comparison: Option<Comparison>,
+}
+
+/// The poses of a log beside those of poses.csv.
+#[derive(Serialize)]
+struct Comparison {
+    session: String,
+    /// Measured, those erased again not counted.
+    poses_measured: usize,
+    poses_erased: usize,
+    /// Not in poses.csv.
+    poses_missing: Vec<MissingPose>,
+}
+
+#[derive(Serialize)]
+struct MissingPose {
+    t_s: f64,
+    chuck: String,
+    sphere: String,
+    bar_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plan_row: Option<usize>,
+}
+
+#[derive(Serialize)]
+struct RecoverReport {
+    session: String,
+    poses_recovered: usize,
 }
 
 #[derive(Serialize)]
@@ -88,17 +134,78 @@ impl LogArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         match &self.what {
             LogCommand::Check { session, output } => check(session, output.json),
+            LogCommand::Recover { session, output } => recover_poses(session, output.json),
             LogCommand::Export { session, files, replace, output } => export(session, files, replace.force, output.json),
         }
     }
 }
 
-fn check(session: &Path, json: bool) -> Result<Outcome, CommandError> {
-    let mut reader = LogReader::open(session)?;
-    let summary = LogSummary::read(&mut reader)?;
-    let report = CheckReport { log: reader.path().display().to_string(), summary };
+fn check(log: &Path, json: bool) -> Result<Outcome, CommandError> {
+    let mut reader = LogReader::open(log)?;
+    let (summary, logged) = LogSummary::read_with_poses(&mut reader)?;
+    let comparison = session_of(reader.path()).map(|session| Comparison::new(&session, &logged)).transpose();
+    // What can be said of the log is said, whatever poses.csv is.
+    let (comparison, unreadable) = comparison.map_or_else(|error| (None, Some(error)), |comparison| (comparison, None));
+    let report = CheckReport { log: reader.path().display().to_string(), summary, comparison };
     print(&report, json)?;
-    Ok(outcome(&report.summary))
+    if let Some(error) = unreadable {
+        return Err(error);
+    }
+    Ok(if report.is_whole() { Outcome::Good } else { Outcome::Doubtful })
+}
+
+/// The session that a log is the log of.
+fn session_of(log: &Path) -> Option<PathBuf> {
+    let session = log.parent()?;
+    let is_session = log.file_name().is_some_and(|name| name == LOG_NAME) && session.join(DESCRIPTION_NAME).is_file();
+    is_session.then(|| session.to_owned())
+}
+
+impl Comparison {
+    fn new(session: &Path, logged: &LoggedPoses) -> Result<Self, CommandError> {
+        let mut missing = missing_poses(session, logged).map_err(|error| record_error(error.into()))?;
+        if !missing.is_empty() {
+            // In a session that is being recorded the latest pose may have been on its way.
+            std::thread::sleep(ON_ITS_WAY);
+            missing = missing_poses(session, logged).map_err(|error| record_error(error.into()))?;
+        }
+        Ok(Self {
+            session: session.display().to_string(),
+            poses_measured: logged.count(),
+            poses_erased: logged.erased(),
+            poses_missing: missing.into_iter().map(Into::into).collect(),
+        })
+    }
+}
+
+/// From a pose's way into the log to its way into poses.csv, at most, on a slow disk.
+const ON_ITS_WAY: Duration = Duration::from_millis(300);
+
+impl From<LoggedPose> for MissingPose {
+    fn from(LoggedPose { connection, pose, .. }: LoggedPose) -> Self {
+        Self {
+            t_s: pose.t_s,
+            chuck: connection.chuck.clone(),
+            sphere: connection.sphere.clone(),
+            bar_mm: tidy(mm_from_m(connection.bar_m)),
+            plan_row: pose.plan_row,
+        }
+    }
+}
+
+impl CheckReport {
+    fn is_whole(&self) -> bool {
+        self.summary.is_whole() && self.comparison.as_ref().is_none_or(|poses| poses.poses_missing.is_empty())
+    }
+}
+
+fn recover_poses(session: &Path, json: bool) -> Result<Outcome, CommandError> {
+    // Without a log there is nothing to recover, and no directory to be made.
+    LogReader::open(&session.join(LOG_NAME))?;
+    let lock = SessionLock::acquire(session).map_err(lock_error)?;
+    let poses_recovered = recover(&lock).map_err(record_error)?;
+    print(&RecoverReport { session: session.display().to_string(), poses_recovered }, json)?;
+    Ok(Outcome::Good)
 }
 
 fn export(session: &Path, files: &ExportFiles, force: bool, json: bool) -> Result<Outcome, CommandError> {
@@ -114,11 +221,7 @@ fn export(session: &Path, files: &ExportFiles, force: bool, json: bool) -> Resul
     if !summary.is_whole() {
         warn(&missing(&summary));
     }
-    Ok(outcome(&summary))
-}
-
-fn outcome(summary: &LogSummary) -> Outcome {
-    if summary.is_whole() { Outcome::Good } else { Outcome::Doubtful }
+    Ok(if summary.is_whole() { Outcome::Good } else { Outcome::Doubtful })
 }
 
 /// What a log lacks, in words.
@@ -148,8 +251,44 @@ impl Report for CheckReport {
         if *unfinished_bytes > 0 {
             text += &format!("the last frame is cut off after {unfinished_bytes} bytes: the program was ended while it wrote\n");
         }
-        let rest = if self.summary.is_whole() { "nothing is missing".to_owned() } else { missing(&self.summary) };
-        text + &rest + "\n"
+        if let Some(Comparison { poses_measured, poses_erased, .. }) = &self.comparison {
+            text += &format!("{poses_measured} poses measured for poses.csv");
+            text += &if *poses_erased > 0 { format!(", {poses_erased} more erased again\n") } else { "\n".to_owned() };
+        }
+        if self.is_whole() {
+            return text + "nothing is missing\n";
+        }
+        if !self.summary.is_whole() {
+            text += &(missing(&self.summary) + "\n");
+        }
+        text + &self.comparison.as_ref().map_or_else(String::new, Comparison::missing)
+    }
+}
+
+impl Comparison {
+    /// What poses.csv lacks, in words.
+    fn missing(&self) -> String {
+        const SHOWN: usize = 10;
+        let Self { session, poses_missing, .. } = self;
+        if poses_missing.is_empty() {
+            return String::new();
+        }
+        let mut text = format!("MISSING in poses.csv: {} poses\n", poses_missing.len());
+        for MissingPose { t_s, chuck, sphere, bar_mm, .. } in poses_missing.iter().take(SHOWN) {
+            text += &format!("  {t_s:.6} s, {chuck}:{sphere}, {bar_mm} mm\n");
+        }
+        text += if poses_missing.len() > SHOWN { "  …\n" } else { "" };
+        text + &format!("Write them: host-cal log recover {session}\n")
+    }
+}
+
+impl Report for RecoverReport {
+    fn text(&self) -> String {
+        let Self { session, poses_recovered } = self;
+        match poses_recovered {
+            0 => format!("{session}: poses.csv lacks nothing that the log holds\n"),
+            _ => format!("{session}: {poses_recovered} poses written into poses.csv\n"),
+        }
     }
 }
 

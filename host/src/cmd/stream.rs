@@ -20,7 +20,9 @@ use super::port::{PortArgs, StillnessArgs, check_kinds};
 use super::report::{Report, print, warn};
 use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
 use crate::files::{Rig, Robot};
-use crate::session::{Connection, ROBOT_NAME, Recorder, Run};
+use crate::session::{
+    Connection, DescriptionError, LockError, LogError, PoseFileError, ROBOT_NAME, RecordError, Recorder, Run, SessionLock,
+};
 use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
 use account::Account;
@@ -113,6 +115,8 @@ struct StreamReport {
     settled: u64,
     tool_poses: u64,
     poses_written: u64,
+    /// Poses of earlier runs that the log held and poses.csv lacked.
+    poses_recovered: usize,
     /// Settled poses that were not written because not every encoder was homed.
     poses_withheld: u64,
     /// Settled poses with a joint beyond its limits; none when the limits are not known.
@@ -152,9 +156,11 @@ impl StreamArgs {
         let account = Account::new(robot, limits, model, recorder, connection, self.stillness.criteria());
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
-        let report = watch.finish()?;
+        let (report, closed) = watch.finish();
         print(&report, self.output.json)?;
+        // What ended the run comes first: it is why the other failed, if it did.
         ended?;
+        closed?;
         let doubts = report.losses.lost() + report.gaps + report.poses_withheld;
         Ok(if doubts == 0 { Outcome::Good } else { Outcome::Doubtful })
     }
@@ -232,11 +238,15 @@ impl StreamArgs {
             ..Run::beginning(link.port_name(), link.hello(), self.rate)
         };
         let kinds = robot.map_or(&[][..], |(robot, _)| robot.kinds());
-        let mut recorder = Recorder::begin(session, run, connection.is_some().then_some(kinds)).map_err(record_error)?;
-        recorder.connect(connection);
+        let lock = SessionLock::acquire(session).map_err(lock_error)?;
+        let mut recorder = Recorder::begin(&lock, run, connection.is_some().then_some(kinds)).map_err(record_error)?;
+        say_recovered(&recorder);
         recorder.frame(link.hello_frame()).map_err(record_error)?;
         if let Some((_, frame)) = robot {
             recorder.frame(frame).map_err(record_error)?;
+        }
+        if let Some(connection) = connection {
+            recorder.connect_for_every_settled(connection, self.stillness.criteria()).map_err(record_error)?;
         }
         if self.selection().settled && self.pairing.is_none() {
             warn("without --pairing and --bar the settled poses go to the log and not to poses.csv");
@@ -246,13 +256,30 @@ impl StreamArgs {
 }
 
 /// What is there and cannot be read is bad input; what cannot be written is not.
-pub(super) fn record_error(error: crate::session::RecordError) -> CommandError {
-    use crate::session::{DescriptionError, LogError, PoseFileError, RecordError};
+pub(super) fn record_error(error: RecordError) -> CommandError {
     match error {
         RecordError::Log(LogError::NotALog { .. } | LogError::OtherVersion { .. })
         | RecordError::Description(DescriptionError::Unreadable { .. })
-        | RecordError::Poses(PoseFileError::OtherColumns { .. } | PoseFileError::Unreadable { .. }) => error.into(),
+        | RecordError::Poses(
+            PoseFileError::OtherColumns { .. } | PoseFileError::Unreadable { .. } | PoseFileError::Damaged { .. },
+        )
+        | RecordError::LongNames { .. } => error.into(),
         error => CommandError::output(error),
+    }
+}
+
+/// Another writer is no failure to write.
+pub(super) fn lock_error(error: LockError) -> CommandError {
+    match error {
+        LockError::InUse { .. } => error.into(),
+        error => CommandError::output(error),
+    }
+}
+
+/// Poses of a run that was killed are no surprise, but nothing to hide.
+pub(super) fn say_recovered(recorder: &Recorder) {
+    if recorder.recovered() > 0 {
+        warn(&format!("{} poses that the log held and poses.csv lacked were written into it", recorder.recovered()));
     }
 }
 

@@ -50,7 +50,7 @@ impl Collector<'_, '_> {
             Bar::Unknown => None,
             Bar::On(joined) => Some(self.connection(joined)),
         };
-        self.board.recorder().connect(None);
+        self.board.recorder().connect(None)?;
         let before_m = self.board.ask()?.displacement_m;
         for attempt in 1..=ATTEMPTS {
             self.operator.tell(&Event::Detach(connection.as_ref()))?;
@@ -77,14 +77,14 @@ impl Collector<'_, '_> {
     pub(super) fn believe_on(&mut self, joined: Joined) -> Result<(), CollectError> {
         let connection = self.connection(joined);
         self.bar = Bar::On(joined);
-        self.board.recorder().connect(Some(connection.clone()));
+        self.board.recorder().connect(Some(connection.clone()))?;
         Ok(self.operator.tell(&Event::Attached(&connection))?)
     }
 
     /// Nobody knows where the bar is any more.
-    pub(super) fn lose_bar(&mut self) {
+    pub(super) fn lose_bar(&mut self) -> Result<(), CollectError> {
         self.bar = Bar::Unknown;
-        self.board.recorder().connect(None);
+        Ok(self.board.recorder().connect(None)?)
     }
 
     /// Whether the bar that the LVDT shows now, if any, can be this one at the arm's place.

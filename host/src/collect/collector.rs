@@ -248,10 +248,10 @@ impl<'a, 'o> Collector<'a, 'o> {
 
     fn erase_last(&mut self) -> Result<(), CollectError> {
         let erased = self.board.recorder().erase_last()?;
-        if erased.poses == 0 {
+        if erased.poses() == 0 {
             return Ok(self.operator.tell(&Event::Trouble("there is no pose to erase"))?);
         }
-        self.summary.written = self.summary.written.saturating_sub(erased.poses);
+        self.summary.written = self.summary.written.saturating_sub(erased.poses());
         if let Some(row) = erased.plan_row.and_then(|line| self.ledger.row_of_line(line)) {
             self.ledger.set(row, RowState::Todo);
             self.stands.remove(&row);

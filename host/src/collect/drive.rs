@@ -121,7 +121,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
             Rest::Never => collector.miss(row, "the arm did not come to stand still there")?,
             Rest::BarOff => {
                 collector.trouble(format!("line {}: the bar came off", planned.line))?;
-                collector.lose_bar();
+                collector.lose_bar()?;
             }
             Rest::Quit => return Ok(true),
         }

@@ -87,7 +87,7 @@ impl Drive<'_, '_, '_, '_> {
             self.halt()?;
         }
         if let Ok(Go::BarOff) = &ended {
-            self.collector.lose_bar();
+            self.collector.lose_bar()?;
         }
         ended
     }

@@ -3,15 +3,13 @@
 //! What is measured at `t` is the length of `t − τ`: `d_measured = d(q) − τ·ḋ`, to first order. `τ` is one more unknown beside the
 //! robot's parameters, with the column `−ḋ`: lengths that grow and lengths that shrink at the same place tell it from all of them.
 
-use std::path::Path;
-
 use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement, Parameter};
 use nalgebra::{DMatrix, DVector};
 
 use super::errors::CollectError;
 use crate::files::{Dataset, Problem, Rig, Robot};
 use crate::identify::{FitError, FitOptions, Identifiability, fit};
-use crate::session::{POSES_NAME, PoseFile, RecordError};
+use crate::session::{POSES_NAME, PoseFile, RecordError, SessionLock};
 
 /// The LVDT's lag.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,8 +56,8 @@ pub fn estimate_lag(robot: &Robot, dataset: &Dataset) -> Result<Option<Lag>, Fit
 ///
 /// # Errors
 /// [`CollectError::Poses`] when the poses cannot be read, [`CollectError::Record`] when they cannot be written.
-pub fn remove_lag(session: &Path, robot: &Robot, rig: &Rig) -> Result<Option<Lag>, CollectError> {
-    let path = session.join(POSES_NAME);
+pub fn remove_lag(lock: &SessionLock, robot: &Robot, rig: &Rig) -> Result<Option<Lag>, CollectError> {
+    let path = lock.session().join(POSES_NAME);
     if !path.is_file() {
         return Ok(None);
     }

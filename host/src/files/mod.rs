@@ -20,6 +20,7 @@ mod robot;
 mod solids;
 mod source;
 mod targets;
+mod temporary;
 mod urdf;
 mod write;
 

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 use super::kind::FileKind;
 use super::protect::{self, Refusal};
+use super::temporary;
 use crate::platform;
 
 /// A file could not be written; what stood there before still stands there.
@@ -157,7 +158,7 @@ impl PendingFile {
         outputs.into_iter().map(begun).collect()
     }
 
-    fn begin_own(path: &Path) -> Result<Self, WriteError> {
+    pub(crate) fn begin_own(path: &Path) -> Result<Self, WriteError> {
         Self::begin_by(path, None)
     }
 
@@ -241,13 +242,10 @@ impl Target {
     /// The file to write before: in the same folder, so that it can be renamed.
     fn temporary(&self) -> IoResult<NamedTempFile> {
         let folder = self.folder();
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".host-cal-");
         let Some(permissions) = &self.permissions else {
-            platform::with_usual_permissions(&mut builder);
-            return builder.tempfile_in(folder);
+            return temporary::create_in(folder, platform::with_usual_permissions);
         };
-        let file = builder.tempfile_in(folder)?;
+        let file = temporary::create_in(folder, |_| ())?;
         file.as_file().set_permissions(permissions.clone())?;
         Ok(file)
     }

@@ -7,7 +7,8 @@ use miette::Diagnostic;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::files::{WriteError, write_atomically};
+use super::own_file::{ForeignChange, OwnFile, ReplaceError};
+use crate::files::WriteError;
 
 /// A session's description; one run for every time that a program recorded into it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -87,18 +88,35 @@ pub struct RobotDescription {
 #[derive(Debug, Error, Diagnostic)]
 pub enum DescriptionError {
     /// It cannot be read.
-    #[error("{}: {reason}", path.display())]
-    #[diagnostic(help("A session's session.toml is written by `host-cal stream`. Give another directory, or mend the file."))]
+    #[error("{}{}: {reason}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
+    #[diagnostic(help(
+        "Nothing was changed. The file is written by `host-cal stream` and `collect`, and says what was recorded with what. Mend it, or move it away; or give another directory."
+    ))]
     Unreadable {
         /// The file.
         path: PathBuf,
+        /// The line, from 1, where it is known.
+        line: Option<usize>,
         /// Why not.
         reason: String,
     },
+    /// Another program has changed it.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Changed(#[from] ForeignChange),
     /// It cannot be written.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Write(#[from] WriteError),
+}
+
+impl From<ReplaceError> for DescriptionError {
+    fn from(error: ReplaceError) -> Self {
+        match error {
+            ReplaceError::Changed(error) => error.into(),
+            ReplaceError::Write(error) => error.into(),
+        }
+    }
 }
 
 impl Description {
@@ -107,24 +125,51 @@ impl Description {
     /// # Errors
     /// [`DescriptionError::Unreadable`].
     pub fn read(session: &Path) -> Result<Self, DescriptionError> {
-        let path = session.join(super::DESCRIPTION_NAME);
-        let unreadable = |reason: String| DescriptionError::Unreadable { path: path.clone(), reason };
-        match std::fs::read_to_string(&path) {
-            Ok(text) => toml::from_str(&text).map_err(|error| unreadable(error.message().replace('\n', ", "))),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
-            Err(error) => Err(unreadable(error.to_string())),
-        }
+        DescriptionFile::open(session).map(|file| file.description)
     }
 
-    /// Writes it.
-    ///
-    /// # Errors
-    /// [`DescriptionError::Write`].
-    pub fn write(&self, session: &Path) -> Result<(), DescriptionError> {
+    fn parse(path: &Path, text: &str) -> Result<Self, DescriptionError> {
+        let unreadable = |line, reason| Err(DescriptionError::Unreadable { path: path.to_owned(), line, reason });
+        match toml::from_str::<Self>(text) {
+            Ok(description) if description.runs.is_empty() => unreadable(None, "no [[runs]], expected one at least".to_owned()),
+            Ok(description) => Ok(description),
+            Err(error) => {
+                let line = error.span().map(|span| 1 + text.bytes().take(span.start).filter(|&byte| byte == b'\n').count());
+                let reason = error.message().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+                unreadable(line, reason)
+            }
+        }
+    }
+}
+
+/// A session's description while somebody records.
+#[derive(Debug)]
+pub(super) struct DescriptionFile {
+    pub(super) description: Description,
+    file: OwnFile,
+}
+
+impl DescriptionFile {
+    /// Reads the description in a session's directory; an empty one when there is none yet.
+    pub(super) fn open(session: &Path) -> Result<Self, DescriptionError> {
         let path = session.join(super::DESCRIPTION_NAME);
-        let text = toml::to_string(self)
-            .map_err(|error| DescriptionError::Unreadable { path: path.clone(), reason: error.to_string() })?;
-        Ok(write_atomically(&path, &text)?)
+        let file = OwnFile::read(&path).map_err(|error| DescriptionError::Unreadable {
+            path: path.clone(),
+            line: None,
+            reason: error.to_string(),
+        })?;
+        let description = file.text().map_or(Ok(Description::default()), |text| Description::parse(&path, text))?;
+        Ok(Self { description, file })
+    }
+
+    /// Writes it, unless somebody else has changed the file.
+    pub(super) fn write(&mut self) -> Result<(), DescriptionError> {
+        let text = toml::to_string(&self.description).map_err(|error| DescriptionError::Unreadable {
+            path: self.file.path().to_owned(),
+            line: None,
+            reason: error.to_string(),
+        })?;
+        Ok(self.file.replace(text)?)
     }
 }
 

@@ -5,14 +5,16 @@
 //! begins with a zero that ends the torn frame, and the reader counts it.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use ballbar::wire::{FrameReader, LogMark, MAX_FRAME, PROTOCOL, ProtocolVersion, ToHost, decode, encode};
 use miette::Diagnostic;
+use same_file::Handle;
 use thiserror::Error;
 
+use super::pose_mark::PoseMark;
 use super::segments::Segments;
 use crate::board::{Implausible, MessageFilter, StreamLosses};
 
@@ -28,6 +30,15 @@ pub enum LogError {
         doing: &'static str,
         /// Its reason.
         error: std::io::Error,
+    },
+    /// Another program has done something to the file that is being written.
+    #[error("{}: another program has {what} it while this one recorded", path.display())]
+    #[diagnostic(help("What was measured until then is in poses.csv. Run the same command again to go on."))]
+    Displaced {
+        /// The file.
+        path: PathBuf,
+        /// What.
+        what: &'static str,
     },
     /// The file is something else.
     #[error("{}: no log of a session: it does not begin with `BBL1`", path.display())]
@@ -67,6 +78,10 @@ fn header() -> [u8; HEADER_BYTES] {
 pub struct LogWriter {
     path: PathBuf,
     file: File,
+    /// The same, to be known again.
+    handle: Handle,
+    /// Length of the file by what was written.
+    length: u64,
     /// A frame could not be written whole: the next one must not be taken for its rest.
     is_torn: bool,
 }
@@ -80,16 +95,19 @@ impl LogWriter {
         let io = |doing| move |error| LogError::Io { path: path.to_owned(), doing, error };
         let mut file =
             OpenOptions::new().read(true).append(true).create(true).open(path).map_err(io("cannot be opened for writing"))?;
-        let length = file.seek(SeekFrom::End(0)).map_err(io("cannot be read"))?;
-        if length == 0 {
-            file.write_all(&header()).map_err(io("cannot be written"))?;
+        let mut begun = Vec::new();
+        Read::by_ref(&mut file).take(HEADER_BYTES as u64).read_to_end(&mut begun).map_err(io("cannot be read"))?;
+        if begun.len() < HEADER_BYTES && header().starts_with(&begun) {
+            // A new file, or one whose program was killed before it had begun.
+            file.write_all(&header()[begun.len()..]).map_err(io("cannot be written"))?;
         } else {
-            file.seek(SeekFrom::Start(0)).map_err(io("cannot be read"))?;
-            check_header(&mut file, path)?;
+            check_header(&mut begun.as_slice(), path)?;
             // Ends the frame that a killed program may have left torn; after a whole one it changes nothing.
             file.write_all(&[0]).map_err(io("cannot be written"))?;
         }
-        let mut writer = Self { path: path.to_owned(), file, is_torn: false };
+        let handle = file.try_clone().and_then(Handle::from_file).map_err(io("cannot be read"))?;
+        let length = file.metadata().map_err(io("cannot be read"))?.len();
+        let mut writer = Self { path: path.to_owned(), file, handle, length, is_torn: false };
         writer.mark(LogMark::Opened { unix_ms: unix_ms() })?;
         Ok(writer)
     }
@@ -101,11 +119,15 @@ impl LogWriter {
     pub fn frame(&mut self, bytes: &[u8]) -> Result<(), LogError> {
         let torn = if self.is_torn { self.file.write_all(&[0]) } else { Ok(()) };
         let written = torn.and_then(|()| self.file.write_all(bytes));
+        self.length += u64::from(self.is_torn) + bytes.len() as u64;
         self.is_torn = written.is_err();
+        if self.is_torn {
+            self.length = self.file.metadata().map_or(0, |metadata| metadata.len());
+        }
         written.map_err(|error| LogError::Io { path: self.path.clone(), doing: "cannot be written", error })
     }
 
-    /// Notes that the port was lost or is back.
+    /// Notes that recording begins, or that the port was lost or is back.
     ///
     /// # Errors
     /// [`LogError::Io`].
@@ -115,12 +137,35 @@ impl LogWriter {
         self.frame(&frame)
     }
 
+    /// Notes something of poses.
+    ///
+    /// # Errors
+    /// [`LogError::Io`].
+    pub fn pose_mark(&mut self, mark: &PoseMark) -> Result<(), LogError> {
+        self.frame(&mark.frame().unwrap_or_default())
+    }
+
     /// Asks the disk to keep what was written, for when the power fails.
     ///
     /// # Errors
     /// [`LogError::Io`].
     pub fn sync(&self) -> Result<(), LogError> {
         self.file.sync_data().map_err(|error| LogError::Io { path: self.path.clone(), doing: "cannot be written", error })
+    }
+
+    /// Whether the file still is where it was opened, with all that was written: on many systems a file that was removed or replaced
+    /// can be written as if nothing had happened.
+    ///
+    /// # Errors
+    /// [`LogError::Displaced`].
+    pub fn check_place(&self) -> Result<(), LogError> {
+        let what = match Handle::from_path(&self.path) {
+            Ok(handle) if handle != self.handle => "put another file in the place of",
+            Ok(_) if self.file.metadata().is_ok_and(|metadata| metadata.len() < self.length) => "cut short",
+            Ok(_) => return Ok(()),
+            Err(_) => "removed",
+        };
+        Err(LogError::Displaced { path: self.path.clone(), what })
     }
 }
 
@@ -136,6 +181,8 @@ pub enum Record {
     Message(Box<ToHost>),
     /// A whole frame, whose message is not to be believed.
     Refused(Implausible),
+    /// What the host noted of poses.
+    Mark(PoseMark),
     /// A frame that is torn or damaged.
     Damaged,
 }
@@ -152,6 +199,11 @@ pub struct LogReader {
 }
 
 impl LogReader {
+    /// Whether there is a log in a session's directory to read; a header that was not written to its end is none yet.
+    pub(super) fn is_begun(session: &Path) -> bool {
+        std::fs::metadata(session.join(super::LOG_NAME)).is_ok_and(|log| log.len() >= HEADER_BYTES as u64)
+    }
+
     /// Opens a log, or the log in a session's directory.
     ///
     /// # Errors
@@ -187,7 +239,9 @@ impl LogReader {
                 None => {}
                 Some(Ok(payload)) => {
                     let message = decode(payload).map(|message| Record::Message(Box::new(message)));
-                    return Ok(Some(self.checked(message.unwrap_or(Record::Damaged))));
+                    let mark = || PoseMark::of_payload(payload).map(Record::Mark);
+                    let record = message.or_else(mark).unwrap_or(Record::Damaged);
+                    return Ok(Some(self.checked(record)));
                 }
                 Some(Err(_)) => return Ok(Some(self.checked(Record::Damaged))),
             }

@@ -5,25 +5,40 @@
 //! | `session.toml` | robot, rig, bar, board, versions and times of every run; written by rename |
 //! | `stream.bbl` | the frames exactly as they came and were found whole; append-only |
 //! | `poses.csv` | the settled poses as [`crate::files`] reads them; written by rename |
+//! | `session.lock` | held by who writes; says who |
 //! | `plan.csv`, `robot.toml`, `rig.toml` | what a plan was walked with, copied |
 
 mod description;
 mod export;
+mod lock;
 mod log;
+mod logged_poses;
+mod own_file;
 mod pose_file;
+mod pose_lines;
+mod pose_mark;
 mod recorder;
+mod recovery;
 mod segments;
+mod settled_rule;
 mod summary;
 
 pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
 pub use export::{LogExportError, LogFormat, export_log};
+pub use lock::{Holder, LockError, SessionLock};
 pub use log::{LogError, LogReader, LogWriter, Record};
+pub use logged_poses::{LoggedPose, LoggedPoses};
+pub use own_file::{ForeignChange, ReplaceError};
 pub use pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
+pub use pose_lines::Damage;
+pub use pose_mark::{MarkedPose, PoseMark};
 pub use recorder::{Connection, MeasuredPose, RecordError, Recorder};
+pub use recovery::{missing_poses, recover};
+pub use settled_rule::{SettledFate, SettledRule};
 pub use summary::LogSummary;
 
 /// Names of the files in a session: no command writes anything else under them.
-pub(crate) const FILE_NAMES: [&str; 6] = [LOG_NAME, DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME];
+pub(crate) const FILE_NAMES: [&str; 7] = [LOG_NAME, DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME, LOCK_NAME];
 /// Folder of a session for programs of the robot's controller.
 pub const PROGRAMS_NAME: &str = "programs";
 /// Name of the log in a session.
@@ -38,3 +53,11 @@ pub const PLAN_NAME: &str = "plan.csv";
 pub const ROBOT_NAME: &str = "robot.toml";
 /// Name of the rig in a session.
 pub const RIG_NAME: &str = "rig.toml";
+/// Name of what a session's writer locks.
+pub const LOCK_NAME: &str = "session.lock";
+
+/// RFC 3339, to the second.
+fn now() -> String {
+    let now = jiff::Timestamp::now();
+    now.round(jiff::Unit::Second).unwrap_or(now).to_string()
+}

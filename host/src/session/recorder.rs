@@ -1,31 +1,26 @@
 //! Takes what a board streams into a session's files.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{BoardHello, LogMark};
-use ballbar::{JointKind, JointVector};
+use ballbar::{JointKind, JointVector, StillnessCriteria};
 use miette::Diagnostic;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::description::{Description, DescriptionError, Run};
+use super::description::{DescriptionError, DescriptionFile, Run};
+use super::lock::SessionLock;
 use super::log::{LogError, LogWriter, unix_ms};
 use super::pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
-use super::{LOG_NAME, POSES_NAME};
+use super::pose_mark::PoseMark;
+use super::recovery::Recovery;
+use super::{LOG_NAME, now};
 use crate::units::{mm_from_m, tidy};
 
 /// Why a recording cannot begin or go on.
 #[derive(Debug, Error, Diagnostic)]
 pub enum RecordError {
-    /// The directory.
-    #[error("{}: cannot be made: {error}", path.display())]
-    Directory {
-        /// The directory.
-        path: PathBuf,
-        /// The operating system's reason.
-        error: std::io::Error,
-    },
     /// The log.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -41,10 +36,17 @@ pub enum RecordError {
     /// Poses while nobody has said what the bar joins.
     #[error("a pose was to be kept without a connection of the bar")]
     NotConnected,
+    /// A chuck and a sphere have names that a log has no room for.
+    #[error("the names of the chuck and the sphere have {bytes} bytes, which the log has no room for")]
+    #[diagnostic(help("A session's log holds what the bar joins. Give the chuck and the sphere shorter names."))]
+    LongNames {
+        /// Both together.
+        bytes: usize,
+    },
 }
 
 /// Which ends the bar joined, and how long it is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Connection {
     /// Name of the chuck.
     pub chuck: String,
@@ -77,37 +79,80 @@ pub struct MeasuredPose {
 }
 
 /// A session being recorded.
+///
+/// A pose goes to the log first and to poses.csv then: whatever ends the program between the two, the next run finds it.
 pub struct Recorder {
-    session: PathBuf,
     log: LogWriter,
     poses: Option<PoseFile>,
     connection: Option<Connection>,
-    description: Description,
+    description: DescriptionFile,
+    recovered: usize,
+    /// Somebody else's change of poses.csv is in the log already.
+    is_change_noted: bool,
     synced: Instant,
+    _lock: SessionLock,
 }
 
-/// How often the disk is asked to keep what was written.
+/// How often the disk is asked to keep what was written, and whether it still is where it was.
 const SYNC_EVERY: Duration = Duration::from_secs(1);
 
 impl Recorder {
-    /// Begins a run in a session's directory, which is made when it is not there. With the kinds of the robot's joints, poses can
-    /// go to poses.csv.
+    /// Begins a run in a session. With the kinds of the robot's joints, poses can go to poses.csv. Poses that the log of earlier runs
+    /// holds and poses.csv lacks are written.
     ///
     /// # Errors
-    /// [`RecordError`]; nothing that was in the directory is changed then.
-    pub fn begin(session: &Path, run: Run, kinds: Option<&[JointKind]>) -> Result<Self, RecordError> {
-        std::fs::create_dir_all(session).map_err(|error| RecordError::Directory { path: session.to_owned(), error })?;
-        let mut description = Description::read(session)?;
-        let poses = kinds.map(|kinds| PoseFile::open(&session.join(POSES_NAME), kinds)).transpose()?;
+    /// [`RecordError`]; nothing that was in the directory is changed when something there is damaged or of another robot.
+    pub fn begin(lock: &SessionLock, run: Run, kinds: Option<&[JointKind]>) -> Result<Self, RecordError> {
+        let session = lock.session();
+        let mut description = DescriptionFile::open(session)?;
+        let recovery = Recovery::find(session, kinds)?;
         let log = LogWriter::open(&session.join(LOG_NAME))?;
-        description.runs.push(run);
-        description.write(session)?;
-        Ok(Self { session: session.to_owned(), log, poses, connection: None, description, synced: Instant::now() })
+        description.description.runs.push(run);
+        description.write()?;
+        let (file, recovered) = recovery.write()?;
+        let poses = file.filter(|_| kinds.is_some());
+        let (connection, is_change_noted, synced) = (None, false, Instant::now());
+        Ok(Self { log, poses, connection, description, recovered, is_change_noted, synced, _lock: lock.clone() })
+    }
+
+    /// Poses of earlier runs that the log held and poses.csv lacked, and that were written when this run began.
+    pub fn recovered(&self) -> usize {
+        self.recovered
     }
 
     /// From here on poses are those of this connection.
-    pub fn connect(&mut self, connection: Option<Connection>) {
+    ///
+    /// # Errors
+    /// [`RecordError::Log`], [`RecordError::LongNames`].
+    pub fn connect(&mut self, connection: Option<Connection>) -> Result<(), RecordError> {
+        self.connect_and(connection, None)
+    }
+
+    /// From here on every settled pose is one of this connection, by [`super::SettledRule`] with these criteria.
+    ///
+    /// # Errors
+    /// [`RecordError::Log`], [`RecordError::LongNames`].
+    pub fn connect_for_every_settled(&mut self, connection: Connection, criteria: StillnessCriteria) -> Result<(), RecordError> {
+        self.connect_and(Some(connection), Some(criteria))
+    }
+
+    fn connect_and(
+        &mut self,
+        connection: Option<Connection>,
+        every_settled: Option<StillnessCriteria>,
+    ) -> Result<(), RecordError> {
+        if connection == self.connection {
+            return Ok(());
+        }
+        let mark = match connection.clone() {
+            Some(connection) => PoseMark::Connected { connection, every_settled },
+            None => PoseMark::Disconnected,
+        };
+        let bytes = connection.as_ref().map_or(0, |Connection { chuck, sphere, .. }| chuck.len() + sphere.len());
+        let frame = mark.frame().ok_or(RecordError::LongNames { bytes })?;
+        self.log.frame(&frame)?;
         self.connection = connection;
+        Ok(())
     }
 
     /// Keeps a frame.
@@ -118,6 +163,7 @@ impl Recorder {
         self.log.frame(bytes)?;
         if self.synced.elapsed() >= SYNC_EVERY {
             self.log.sync()?;
+            self.log.check_place()?;
             self.synced = Instant::now();
         }
         Ok(())
@@ -131,21 +177,29 @@ impl Recorder {
     /// Keeps poses.
     ///
     /// # Errors
-    /// [`RecordError::Poses`], [`RecordError::NotConnected`].
+    /// [`RecordError::Poses`], [`RecordError::Log`], [`RecordError::NotConnected`].
     pub fn poses(&mut self, poses: &[MeasuredPose]) -> Result<(), RecordError> {
-        let (Some(file), Some(Connection { chuck, sphere, bar_m })) = (&mut self.poses, &self.connection) else {
+        let (Some(file), Some(connection)) = (&mut self.poses, &self.connection) else {
             return Err(RecordError::NotConnected);
         };
-        Ok(file.add(poses.iter().map(|pose| SettledRow {
-            chuck,
-            sphere,
-            q: pose.q,
-            length_m: bar_m + pose.displacement_m,
-            t_s: pose.t_s,
-            bar_m: *bar_m,
-            rate_m_s: pose.rate_m_s,
-            plan_row: pose.plan_row,
-        }))?)
+        for pose in poses {
+            self.log.pose_mark(&PoseMark::measured(pose, file.kinds().len()))?;
+        }
+        let added = file.add(poses.iter().map(|pose| SettledRow::new(connection, pose)));
+        self.note_change(added)
+    }
+
+    /// What somebody else takes out of poses.csv while this program records stays out.
+    fn note_change<T>(&mut self, result: Result<T, PoseFileError>) -> Result<T, RecordError> {
+        if let (Err(PoseFileError::Changed(change)), Some(file)) = (&result, &self.poses)
+            && !self.is_change_noted
+        {
+            self.is_change_noted = true;
+            for t_us in file.taken_out(change) {
+                self.log.pose_mark(&PoseMark::Erased { t_us })?;
+            }
+        }
+        Ok(result?)
     }
 
     /// Lines of plan.csv that poses were kept for, over all runs.
@@ -155,7 +209,7 @@ impl Recorder {
 
     /// Lines of plan.csv that the operator skipped, over all runs.
     pub fn skipped_lines(&self) -> Vec<usize> {
-        self.description.runs.iter().flat_map(|run| run.skipped.iter().copied()).collect()
+        self.description.description.runs.iter().flat_map(|run| run.skipped.iter().copied()).collect()
     }
 
     /// Notes that the operator skips a line of plan.csv.
@@ -163,18 +217,25 @@ impl Recorder {
     /// # Errors
     /// [`RecordError::Description`].
     pub fn skip(&mut self, line: usize) -> Result<(), RecordError> {
-        if let Some(run) = self.description.runs.last_mut() {
+        if let Some(run) = self.description.description.runs.last_mut() {
             run.skipped.push(line);
         }
-        Ok(self.description.write(&self.session)?)
+        Ok(self.description.write()?)
     }
 
     /// Takes the latest pose, or all those of the latest move, out again.
     ///
     /// # Errors
-    /// [`RecordError::Poses`].
+    /// [`RecordError::Poses`], [`RecordError::Log`].
     pub fn erase_last(&mut self) -> Result<Erased, RecordError> {
-        Ok(self.poses.as_mut().map_or(Ok(Erased::default()), PoseFile::erase_last)?)
+        let erased = self.poses.as_mut().map_or(Ok(Erased::default()), PoseFile::erase_last);
+        let erased = self.note_change(erased)?;
+        for &t_us in &erased.times_us {
+            self.log.pose_mark(&PoseMark::Erased { t_us })?;
+        }
+        // With less than this on the disk, a power cut would bring them back.
+        self.log.sync()?;
+        Ok(erased)
     }
 
     /// Notes that the port was lost.
@@ -193,18 +254,37 @@ impl Recorder {
         Ok(self.log.mark(LogMark::Back { unix_ms: unix_ms() })?)
     }
 
-    /// Ends the run.
+    /// Ends the run, as far as that can be done.
     ///
     /// # Errors
-    /// [`RecordError`].
+    /// [`RecordError`], the first of several.
     pub fn end(mut self) -> Result<(), RecordError> {
-        self.log.sync()?;
+        let checked = self.poses.as_ref().map_or(Ok(()), PoseFile::check);
+        let checked = self.note_change(checked);
+        let logged = self.log.sync().and_then(|()| self.log.check_place());
         let added = self.poses.as_ref().map_or(0, PoseFile::added);
-        if let Some(run) = self.description.runs.last_mut() {
+        if let Some(run) = self.description.description.runs.last_mut() {
             run.ended = Some(now());
             run.poses = added;
         }
-        Ok(self.description.write(&self.session)?)
+        let described = self.description.write();
+        checked.and(logged.map_err(Into::into)).and(described.map_err(Into::into))
+    }
+}
+
+impl<'a> SettledRow<'a> {
+    /// A pose of a connection.
+    pub(super) fn new(Connection { chuck, sphere, bar_m }: &'a Connection, pose: &MeasuredPose) -> Self {
+        SettledRow {
+            chuck,
+            sphere,
+            q: pose.q,
+            length_m: bar_m + pose.displacement_m,
+            t_s: pose.t_s,
+            bar_m: *bar_m,
+            rate_m_s: pose.rate_m_s,
+            plan_row: pose.plan_row,
+        }
     }
 }
 
@@ -228,10 +308,4 @@ impl Run {
             robot: hello.active.as_ref().map(Into::into),
         }
     }
-}
-
-/// RFC 3339, to the second.
-fn now() -> String {
-    let now = jiff::Timestamp::now();
-    now.round(jiff::Unit::Second).unwrap_or(now).to_string()
 }

@@ -4,7 +4,7 @@ use ballbar::wire::{LogMark, ToHost};
 
 use super::log::Record;
 
-/// Follows a log. A segment begins at every mark, and at a hello that stands where none belongs: a recording keeps a hello right
+/// Follows a log. A segment begins at every mark of recording and port, and at a hello that stands where none belongs: a recording keeps a hello right
 /// behind its mark, so that a mark before this one is damaged.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Segments {
@@ -17,7 +17,7 @@ impl Segments {
     pub(super) fn begins(&mut self, record: &Record) -> bool {
         let message = match record {
             Record::Message(message) => message,
-            Record::Refused(_) => return false,
+            Record::Refused(_) | Record::Mark(_) => return false,
             Record::Damaged => {
                 self.is_greeting = false;
                 return false;

@@ -4,6 +4,7 @@ use ballbar::wire::{Event, LogMark, ToHost};
 use serde::Serialize;
 
 use super::log::{LogError, LogReader, Record};
+use super::logged_poses::LoggedPoses;
 use super::segments::Segments;
 use crate::board::StreamLosses;
 
@@ -38,11 +39,21 @@ impl LogSummary {
     /// # Errors
     /// [`LogError`].
     pub fn read(reader: &mut LogReader) -> Result<Self, LogError> {
-        let mut summing = Summing::default();
+        Self::read_with_poses(reader).map(|(summary, _)| summary)
+    }
+
+    /// Reads a log to its end, and gathers the poses that it holds.
+    ///
+    /// # Errors
+    /// [`LogError`].
+    pub fn read_with_poses(reader: &mut LogReader) -> Result<(Self, LoggedPoses), LogError> {
+        let (mut summing, mut logged) = (Summing::default(), LoggedPoses::default());
         while let Some(record) = reader.next_record()? {
             summing.take(&record);
+            logged.take(&record);
         }
-        Ok(summing.end(reader))
+        logged.end();
+        Ok((summing.end(reader), logged))
     }
 
     /// Whether nothing is missing: no frame damaged, no message or sample lost or refused, no port lost.
@@ -87,7 +98,7 @@ impl Summing {
         }
         let message = match record {
             Record::Message(message) => message,
-            Record::Refused(_) => {
+            Record::Refused(_) | Record::Mark(_) => {
                 self.summary.frames += 1;
                 return;
             }

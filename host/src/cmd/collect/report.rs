@@ -28,6 +28,8 @@ pub(super) struct CollectReport {
     missed: Vec<MissedLine>,
     /// Poses written in this run.
     poses_written: usize,
+    /// Poses of earlier runs that the log held and poses.csv lacked.
+    poses_recovered: usize,
     repeats: Vec<RepeatLine>,
     /// Of the lengths at poses returned to, RMS.
     repeatability_mm: Option<f64>,
@@ -82,6 +84,7 @@ impl CollectReport {
             left: ledger.count(&RowState::Todo),
             missed: ledger.missed().into_iter().map(|(line, why)| MissedLine { line, why }).collect(),
             poses_written: summary.written,
+            poses_recovered: 0,
             repeatability_mm: (!repeats.is_empty()).then(|| mean_square.sqrt()),
             repeats,
             lag_ms: None,
@@ -90,6 +93,10 @@ impl CollectReport {
             losses: summary.losses,
             duration_s: duration.as_secs_f64(),
         }
+    }
+
+    pub(super) fn set_recovered(&mut self, poses: usize) {
+        self.poses_recovered = poses;
     }
 
     pub(super) fn set_lag(&mut self, lag: &Lag) {

@@ -27,6 +27,9 @@ enum SessionFileError {
     #[error("{flag} is missing, and {} holds no {name}", session.display())]
     #[diagnostic(help("A new session needs --plan, --robot and --rig."))]
     Missing { flag: &'static str, session: PathBuf, name: &'static str },
+    #[error("{}: another program has begun this session just now", path.display())]
+    #[diagnostic(help("Run the same command again to go on with it."))]
+    BegunMeanwhile { path: PathBuf },
     #[error("{}: cannot be made: {error}", path.display())]
     Directory { path: PathBuf, error: std::io::Error },
 }
@@ -49,9 +52,12 @@ impl SessionFiles {
         Ok(Self { robot, rig, rows, new })
     }
 
-    /// Copies into the session what it does not hold yet.
+    /// Copies into the session, which nobody else writes into now, what it does not hold yet.
     pub(super) fn write(&self) -> Result<(), CommandError> {
         for (path, source) in &self.new {
+            if path.exists() {
+                return Err(SessionFileError::BegunMeanwhile { path: path.clone() }.into());
+            }
             if let Some(folder) = path.parent() {
                 let failed = |error| CommandError::output(SessionFileError::Directory { path: folder.to_owned(), error });
                 std::fs::create_dir_all(folder).map_err(failed)?;

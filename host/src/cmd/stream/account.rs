@@ -9,7 +9,7 @@ use super::watch::RobotAndFrame;
 use crate::board::{Frame, Refusals, RobotOnBoard, StreamLosses};
 use crate::cmd::outcome::CommandError;
 use crate::files::{BeyondLimits, Robot};
-use crate::session::{Connection, MeasuredPose, Recorder};
+use crate::session::{Connection, Recorder, SettledFate, SettledRule};
 use crate::units::{mm_from_m, tidy};
 
 /// The books of one run.
@@ -37,9 +37,8 @@ pub(super) struct Account {
     pub(super) gaps: u64,
     /// Whether all encoders of the joints were homed, as of the latest message.
     pub(super) is_homed: Option<bool>,
-    /// The pose that was written last, when the port was lost since: an arm that still stands there settles again.
-    doubtful: Option<SettledPose>,
-    last_written: Option<SettledPose>,
+    /// Which settled poses are written.
+    rule: SettledRule,
     refusals: Refusals,
     /// Follows the board's own, where samples come.
     detector: SettleDetector,
@@ -65,8 +64,7 @@ impl Account {
             recorder,
             connection,
             withheld: 0,
-            doubtful: None,
-            last_written: None,
+            rule: SettledRule::new(criteria),
             refusals: Refusals::default(),
             detector: SettleDetector::new(criteria),
             losses: StreamLosses::default(),
@@ -138,7 +136,7 @@ impl Account {
         self.losses_before = self.losses;
         self.clock = None;
         self.detector.restart();
-        self.doubtful = self.last_written.take().or(self.doubtful.take());
+        self.rule.lose_port();
         self.recorder.as_mut().map_or(Ok(()), Recorder::lost).map_err(record_error)
     }
 
@@ -186,8 +184,7 @@ impl Account {
         };
         let (q, displacement_m) = robot.settled(pose);
         let joints = crate::units::joints_text(robot.kinds(), q.as_array());
-        let is_homed = robot.is_homed(stream.homed);
-        let beyond = self.take_limits(&q, is_homed);
+        let beyond = self.take_limits(&q, robot.is_homed(stream.homed));
         let Some(displacement_m) = displacement_m else {
             return Ok(format!("settled {number}: {joints}, and the bar beyond its travel: no pose{beyond}"));
         };
@@ -196,7 +193,7 @@ impl Account {
             Some(bar_mm) => format!("{:.4} mm", bar_mm + displacement_mm),
             None => format!("{displacement_mm:+.4} mm from mid travel"),
         };
-        let fate = self.keep(pose, q, displacement_m, is_homed)?;
+        let fate = self.keep(pose, stream.homed)?;
         Ok(format!("settled {number}: {joints}, {length}, {} samples{fate}{beyond}", pose.samples))
     }
 
@@ -211,36 +208,23 @@ impl Account {
     }
 
     /// Writes a pose, where poses are written, and says when it is not.
-    fn keep(
-        &mut self,
-        pose: &SettledPose,
-        q: JointVector<f64>,
-        displacement_m: f64,
-        is_homed: bool,
-    ) -> Result<&'static str, CommandError> {
-        let not_homed = "; NOT HOMED: host-cal home PORT --q …";
+    fn keep(&mut self, pose: &SettledPose, homed: u8) -> Result<&'static str, CommandError> {
+        let Some(robot) = &self.robot else { return Ok("") };
         let Some(recorder) = self.recorder.as_mut().filter(|recorder| recorder.writes_poses()) else {
-            return Ok(if is_homed { "" } else { not_homed });
+            return Ok(if robot.is_homed(homed) { "" } else { "; NOT HOMED: host-cal home PORT --q …" });
         };
-        if !is_homed {
-            self.withheld += 1;
-            return Ok("; not written, because the encoders are NOT HOMED: host-cal home PORT --q …");
+        match self.rule.judge(robot, pose, homed) {
+            SettledFate::Kept(pose) => {
+                recorder.poses(&[pose]).map_err(record_error)?;
+                self.written += 1;
+                Ok("")
+            }
+            SettledFate::BeyondTravel => Ok(""),
+            SettledFate::NotHomed => {
+                self.withheld += 1;
+                Ok("; not written, because the encoders are NOT HOMED: host-cal home PORT --q …")
+            }
+            SettledFate::SameStand => Ok("; still where the last pose was written: not written again"),
         }
-        if self.doubtful.take().is_some_and(|before| is_same_stand(&before, pose, &self.detector.criteria())) {
-            self.last_written = Some(pose.clone());
-            return Ok("; still where the last pose was written: not written again");
-        }
-        let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
-        recorder.poses(&[MeasuredPose { q, displacement_m, t_s, rate_m_s: None, plan_row: None }]).map_err(record_error)?;
-        self.written += 1;
-        self.last_written = Some(pose.clone());
-        Ok("")
     }
-}
-
-/// Whether the arm has not moved between two poses, as far as the bands tell.
-fn is_same_stand(before: &SettledPose, now: &SettledPose, criteria: &StillnessCriteria) -> bool {
-    let counts = before.counts_mean.iter().zip(&now.counts_mean).map(|(before, now)| (before - now).abs());
-    counts.fold(0.0, f64::max) <= f64::from(criteria.band_counts)
-        && (before.code_mean - now.code_mean).abs() <= f64::from(criteria.band_codes)
 }

@@ -13,7 +13,7 @@ use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
 use crate::cmd::outcome::CommandError;
 use crate::cmd::port::EndRequest;
 use crate::cmd::screen::{Key, Screen};
-use crate::session::BoardDescription;
+use crate::session::{BoardDescription, Recorder};
 
 /// One run of `stream`.
 pub(super) struct Watch<'a> {
@@ -115,16 +115,17 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Ends the stream and the session, and says what came of it.
-    pub(super) fn finish(mut self) -> Result<StreamReport, CommandError> {
+    /// Ends the stream and the session, and says what came of it and whether all could be written.
+    pub(super) fn finish(mut self) -> (StreamReport, Result<(), CommandError>) {
         self.screen.close();
+        let mut written = Ok(());
         if let Link::Up(link) = &mut self.link {
             // A board that is gone by now needs no end.
             let _ = link.end_stream();
             self.account.count_losses(link.losses());
             // What the board had gathered came before its answer.
             for frame in link.take_frames() {
-                self.account.take(&frame)?;
+                written = written.and(self.account.take(&frame).map(drop));
             }
         }
         let (hello, frames) = match self.link {
@@ -144,6 +145,7 @@ impl<'a> Watch<'a> {
             settled: account.settled,
             tool_poses: account.tool_poses,
             poses_written: account.written,
+            poses_recovered: account.recorder.as_ref().map_or(0, Recorder::recovered),
             poses_withheld: account.withheld,
             beyond_limits: account.limits.as_ref().map(|_| account.beyond_limits),
             losses: account.losses(),
@@ -152,8 +154,8 @@ impl<'a> Watch<'a> {
             latest: account.latest,
             session: self.args.session.as_ref().map(|session| session.display().to_string()),
         };
-        account.recorder.map_or(Ok(()), |recorder| recorder.end()).map_err(record_error)?;
-        Ok(report)
+        let ended = account.recorder.map_or(Ok(()), Recorder::end).map_err(record_error);
+        (report, written.and(ended))
     }
 
     fn is_done(&self) -> bool {

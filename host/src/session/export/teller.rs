@@ -3,6 +3,7 @@
 use ballbar::wire::{Answer, Event, LogMark, Stream, ToHost};
 
 use super::super::log::Record;
+use super::super::pose_mark::PoseMark;
 use super::super::segments::{Segments, unix_ms_of};
 use super::entry::{Entry, Stamp};
 use super::shape::Shape;
@@ -44,6 +45,7 @@ impl<'a> Teller<'a> {
         let message = match record {
             Record::Message(message) => message,
             Record::Refused(reason) => return tell(&self.note(true, format!("a message is not believed: {reason}"))),
+            Record::Mark(mark) => return tell(&self.note(false, text_of(&mark))),
             Record::Damaged => return tell(&self.note(true, "a frame is torn or damaged".into())),
         };
         match *message {
@@ -81,7 +83,7 @@ impl<'a> Teller<'a> {
                 ToHost::Mark(mark) => us_from_ms(unix_ms_of(mark)),
                 _ => None,
             },
-            Record::Refused(_) | Record::Damaged => None,
+            Record::Refused(_) | Record::Mark(_) | Record::Damaged => None,
         });
     }
 
@@ -133,6 +135,16 @@ impl<'a> Teller<'a> {
         let now_us = self.clock.now_us;
         let stamp = Stamp { unix_us: self.clock.is_known.then_some(now_us), log_us: now_us, ..Stamp::default() };
         Entry::Note { stamp, is_warning, text }
+    }
+}
+
+/// What the host noted of poses, in words.
+fn text_of(mark: &PoseMark) -> String {
+    match mark {
+        PoseMark::Connected { connection, .. } => format!("the bar joins {connection}"),
+        PoseMark::Disconnected => "the bar is off, or nobody knows what it joins".into(),
+        PoseMark::Measured(pose) => format!("the pose of {:.6} s was measured", pose.t_s),
+        PoseMark::Erased { t_us } => format!("the pose of {:.6} s was erased", *t_us as f64 * 1e-6),
     }
 }
 
