@@ -14,4 +14,4 @@ pub use lvdt_fit::{LvdtFitError, LvdtPoint, check_lvdt_points, fit_lvdt};
 pub use port::{BAUD, Port};
 pub use robot_on_board::{NOMINAL_TRAVEL_M, RobotOnBoard, SetError, nominal_lvdt, parameter_set};
 pub use tally::{StreamLosses, StreamTally};
-pub use verify::{KinematicsDifference, rms_kinematics, verify_kinematics};
+pub use verify::{KinematicsDifference, rms_kinematics, rounding_of_kinematics, verify_kinematics};
