@@ -78,6 +78,7 @@ impl<H: Hardware> Board<'_, H> {
             Command::Status => Ok(Answer::Status(self.status())),
             Command::SelfTest => Ok(Answer::SelfTest(self_test(&self.findings()))),
             Command::ReadParameters(which) => self.parameters.read(*which, self.hardware.flash()).map(Answer::Parameters),
+            Command::ReadPrevious => self.parameters.read_previous(self.hardware.flash()).map(Answer::Parameters),
             Command::WriteParameters(set) => self.parameters.stage(set.clone()).map(|crc| Answer::Staged { crc }),
             Command::SetLvdt(curve) => {
                 self.parameters.stage_lvdt(*curve, self.hardware.flash()).map(|crc| Answer::Staged { crc })
@@ -199,7 +200,7 @@ impl<H: Hardware> Board<'_, H> {
             t_us: sample.t_us,
             homed: self.sensors.homed(),
             q: q.as_array()[..parameters.joints].iter().copied().collect(),
-            pose: ToolPose::from(&parameters.kinematics.base_from_tool(&q)),
+            pose: parameters.tool_pose(&q).ok_or(Refusal::NotFinite)?,
             displacement_m: parameters.lvdt.displacement_m(sample.lvdt).ok(),
         })
     }
@@ -214,7 +215,7 @@ impl<H: Hardware> Board<'_, H> {
         }
         let mut vector = JointVector::zero();
         vector.as_array_mut()[..q.len()].copy_from_slice(q);
-        Ok(ToolPose::from(&parameters.kinematics.base_from_tool(&vector)))
+        parameters.tool_pose(&vector).ok_or(Refusal::NotFinite)
     }
 
     fn status(&self) -> Status {
@@ -244,6 +245,7 @@ impl<H: Hardware> Board<'_, H> {
             staged: self.parameters.staged_crc(),
             slots: self.parameters.slots(),
             stack_unused_bytes: self.hardware.stack_unused_bytes(),
+            previous: self.parameters.previous().cloned(),
         }
     }
 

@@ -11,6 +11,7 @@ use crate::{ENCODERS, ParameterFlash};
 pub(crate) struct Parameters {
     slots: Slots,
     active: Option<Active>,
+    previous: Option<SetIdentity>,
     staged: Option<Staged>,
 }
 
@@ -28,18 +29,27 @@ struct Staged {
 impl Parameters {
     /// None, before the flash was looked into.
     pub(crate) fn none() -> Self {
-        Self { slots: Slots::unread(), active: None, staged: None }
+        Self { slots: Slots::unread(), active: None, previous: None, staged: None }
     }
 
     /// Takes into use what the flash holds.
     pub(crate) fn load(flash: &mut impl ParameterFlash) -> Self {
         let (slots, set) = Slots::load(flash);
-        // A whole set that this firmware cannot use was written by another one; it stays in flash, unused.
+        // A whole set that this firmware cannot use was written by another one; it stays in flash, unused. So does the one before:
+        // it is not the robot's any more.
         let active = set.and_then(|set| Staged::check(set).ok()).map(|staged| Active::new(staged, &slots));
         if active.is_none() {
             warning!("no parameters in flash");
         }
-        Self { slots, active, staged: None }
+        let mut parameters = Self { slots, active, previous: None, staged: None };
+        parameters.identify_previous(flash);
+        parameters
+    }
+
+    /// Not inlined, so that the set does not lie on the stack beside the one that was loaded.
+    #[inline(never)]
+    fn identify_previous(&mut self, flash: &mut impl ParameterFlash) {
+        self.previous = self.slots.read_previous(flash).map(|(sequence, crc, set)| identity(&set, sequence, crc));
     }
 
     pub(crate) fn active(&self) -> Option<&CompiledParameters> {
@@ -48,6 +58,11 @@ impl Parameters {
 
     pub(crate) fn identity(&self) -> Option<&SetIdentity> {
         self.active.as_ref().map(|active| &active.identity)
+    }
+
+    /// What was in use before, and still stands in flash.
+    pub(crate) fn previous(&self) -> Option<&SetIdentity> {
+        self.previous.as_ref()
     }
 
     pub(crate) fn staged_crc(&self) -> Option<u32> {
@@ -77,6 +92,13 @@ impl Parameters {
             (WhichSet::Staged, _, Some(staged)) => Ok(staged.set.clone()),
             _ => Err(Refusal::NoParameters),
         }
+    }
+
+    /// The set that was in use before, as it stands in flash.
+    pub(crate) fn read_previous(&self, flash: &mut impl ParameterFlash) -> Result<ParameterSet, Refusal> {
+        let previous = self.previous.as_ref().ok_or(Refusal::NoPrevious)?;
+        let stored = self.slots.read_previous(flash).filter(|(_, crc, _)| *crc == previous.crc);
+        stored.map(|(_, _, set)| set).ok_or(Refusal::Flash)
     }
 
     pub(crate) fn stage(&mut self, set: ParameterSet) -> Result<u32, Refusal> {
@@ -119,21 +141,20 @@ impl Parameters {
         }
         info!("parameters committed");
         self.active = self.staged.take().map(|staged| Active::new(staged, &self.slots));
+        self.identify_previous(flash);
         Ok(())
     }
 }
 
 impl Active {
     fn new(staged: Staged, slots: &Slots) -> Self {
-        let identity = SetIdentity {
-            name: staged.set.name,
-            is_calibrated: staged.set.is_calibrated,
-            joints: staged.compiled.joints as u8,
-            sequence: slots.active().map_or(0, |(sequence, _)| sequence),
-            crc: staged.crc,
-        };
-        Self { identity, compiled: staged.compiled }
+        let sequence = slots.active().map_or(0, |(sequence, _)| sequence);
+        Self { identity: identity(&staged.set, sequence, staged.crc), compiled: staged.compiled }
     }
+}
+
+fn identity(set: &ParameterSet, sequence: u32, crc: u32) -> SetIdentity {
+    SetIdentity { name: set.name.clone(), is_calibrated: set.is_calibrated, joints: set.kinds.len() as u8, sequence, crc }
 }
 
 impl Staged {

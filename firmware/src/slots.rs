@@ -10,10 +10,15 @@
 //! | 12..16 | length of the set, bytes |
 //! | 16..20 | CRC-32 over bytes 0 to 16 and the set |
 //! | 20.. | the set, padded with ones to the flash's word |
+//! | 1024.. | up to 16 renewals of 32 bytes, where the slot has room: a later sequence, CRC-32 over the set's CRC-32 and it, ones |
 //!
 //! A commit erases and writes the older slot, the set first and its header last, and reads it back; the newer slot is not touched
 //! until then. Whatever byte the power fails at, the newer slot is whole, or the one just written is. The first commit ever writes
 //! both, so that from then on one slot may also be lost to a flipped bit.
+//!
+//! A commit of the set that stands in the older slot erases nothing: it writes a renewal there, which makes that slot the newer one.
+//! So whoever goes back to the set before loses neither of the two, whatever byte the power fails at. A commit of the set that is
+//! in use already writes nothing, so that it does not cost the one before.
 
 use ballbar::wire::{ParameterSet, SlotState};
 use ballbar::{crc32, crc32_digest};
@@ -30,8 +35,12 @@ const LAYOUT: [u8; 4] = {
 const HEADER_BYTES: usize = 20;
 /// The longest set, with room to grow.
 const MAX_SET_BYTES: usize = 1004;
-/// The most bytes that a slot uses.
+/// The most bytes that a header and its set take.
 pub const SLOT_IMAGE_BYTES: usize = HEADER_BYTES + MAX_SET_BYTES;
+/// Renewals of a slot, until it is erased again.
+const RENEWALS: usize = 16;
+/// Whole words of any flash: the longest that are known have 32 bytes.
+const RENEWAL_BYTES: usize = 32;
 
 type Image = [u8; SLOT_IMAGE_BYTES];
 
@@ -90,17 +99,34 @@ impl Slots {
     pub fn commit(&mut self, flash: &mut impl ParameterFlash, set: &ParameterSet) -> Result<(), CommitError> {
         // As they are now: a slot that was good at start may have rotted since, and the other one is then not to be erased.
         // One that cannot be read may be the good one.
+        let mut holds_it = [false; 2];
         for (slot, state) in self.states.iter_mut().enumerate() {
-            *state = read_slot(flash, slot)?.0;
+            let (found, stored) = read_slot(flash, slot)?;
+            *state = found;
+            holds_it[slot] = stored.is_some_and(|stored| is_same(&stored, set));
         }
         let sequence = self.active().map_or(0, |(sequence, _)| sequence.wrapping_add(1));
         let oldest = self.newest().map_or(0, |newest| 1 - newest);
+        let is_good = |state: &SlotState| matches!(state, SlotState::Good { .. });
+        if self.states.iter().all(is_good) && (holds_it[1 - oldest] || holds_it[oldest] && self.renew(flash, oldest, sequence)?) {
+            return Ok(());
+        }
         self.write(flash, oldest, sequence, set)?;
-        if !matches!(self.states[1 - oldest], SlotState::Good { .. }) {
+        if !is_good(&self.states[1 - oldest]) {
             // The set is stored already; without its copy, the slots' states say so.
             let _ = self.write(flash, 1 - oldest, sequence, set);
         }
         Ok(())
+    }
+
+    /// What was in use before the newest set, with its sequence and CRC-32; none where both slots hold the same, or the other one is
+    /// not whole.
+    pub fn read_previous(&self, flash: &mut impl ParameterFlash) -> Option<(u32, u32, ParameterSet)> {
+        let (_, newest_crc) = self.active()?;
+        match read_slot(flash, 1 - self.newest()?) {
+            Ok((SlotState::Good { sequence, crc }, Some(set))) if crc != newest_crc => Some((sequence, crc, set)),
+            _ => None,
+        }
     }
 
     fn newest(&self) -> Option<usize> {
@@ -112,6 +138,22 @@ impl Slots {
             [_, SlotState::Good { .. }] => Some(1),
             _ => None,
         }
+    }
+
+    /// Makes a whole slot the newest as it stands; false where it has no room for another renewal. A flash that fails is no reason
+    /// to erase the slot.
+    fn renew<F: ParameterFlash>(&mut self, flash: &mut F, slot: usize, sequence: u32) -> Result<bool, CommitError> {
+        let SlotState::Good { crc, .. } = self.states[slot] else { return Ok(false) };
+        let is_free = |at: &u32| read_renewal(flash, *at).is_ok_and(|bytes| bytes == [0xff; RENEWAL_BYTES]);
+        let Some(free) = renewals::<F>(slot).find(is_free) else { return Ok(false) };
+        let written = flash.write(free, &renewal(crc, sequence));
+        // What reads back counts, whatever the flash says of it: it is what the next start finds.
+        let renewed = SlotState::Good { sequence, crc };
+        if read_slot(flash, slot)?.0 == renewed {
+            self.states[slot] = renewed;
+            return Ok(true);
+        }
+        Err(if written.is_err() { CommitError::Flash } else { CommitError::ReadBack })
     }
 
     fn write(
@@ -177,6 +219,8 @@ fn write_image<F: ParameterFlash>(flash: &mut F, slot: usize, image: &Image, len
     flash.write(start, &image[..header]).map_err(|_| ())
 }
 
+/// Not inlined, so that its kilobytes do not lie on the stack of every caller.
+#[inline(never)]
 fn read_slot<F: ParameterFlash>(flash: &mut F, slot: usize) -> Result<(SlotState, Option<ParameterSet>), CommitError> {
     let mut image: Image = [0; SLOT_IMAGE_BYTES];
     let length = SLOT_IMAGE_BYTES.min(F::SLOT_BYTES as usize) / <F as ReadNorFlash>::READ_SIZE * <F as ReadNorFlash>::READ_SIZE;
@@ -184,10 +228,9 @@ fn read_slot<F: ParameterFlash>(flash: &mut F, slot: usize) -> Result<(SlotState
     if image[..HEADER_BYTES].iter().all(|&byte| byte == 0xff) {
         return Ok((SlotState::Empty, None));
     }
-    Ok(match parse(&image[..length]) {
-        Some((sequence, crc, set)) => (SlotState::Good { sequence, crc }, Some(set)),
-        None => (SlotState::Damaged, None),
-    })
+    let Some((sequence, crc, set)) = parse(&image[..length]) else { return Ok((SlotState::Damaged, None)) };
+    let sequence = last_renewal(flash, slot, crc)?.unwrap_or(sequence);
+    Ok((SlotState::Good { sequence, crc }, Some(set)))
 }
 
 fn parse(image: &[u8]) -> Option<(u32, u32, ParameterSet)> {
@@ -198,4 +241,43 @@ fn parse(image: &[u8]) -> Option<(u32, u32, ParameterSet)> {
     let payload = &image[HEADER_BYTES..];
     let set = is_valid.then(|| ballbar::wire::decode(payload))??;
     Some((word(8)?, crc32(payload), set))
+}
+
+/// Where a slot's renewals are.
+fn renewals<F: ParameterFlash>(slot: usize) -> impl Iterator<Item = u32> {
+    let fits =
+        RENEWAL_BYTES.is_multiple_of(<F as NorFlash>::WRITE_SIZE) && RENEWAL_BYTES.is_multiple_of(<F as ReadNorFlash>::READ_SIZE);
+    let room = (F::SLOT_BYTES as usize).saturating_sub(SLOT_IMAGE_BYTES) / RENEWAL_BYTES;
+    let count = if fits { room.min(RENEWALS) } else { 0 };
+    (0..count).map(move |i| slot as u32 * F::SLOT_BYTES + (SLOT_IMAGE_BYTES + i * RENEWAL_BYTES) as u32)
+}
+
+/// A later sequence for the set with this CRC-32.
+fn renewal(set_crc: u32, sequence: u32) -> [u8; RENEWAL_BYTES] {
+    let mut bytes = [0xff; RENEWAL_BYTES];
+    let mut digest = crc32_digest();
+    digest.update(&set_crc.to_le_bytes());
+    digest.update(&sequence.to_le_bytes());
+    bytes[..4].copy_from_slice(&sequence.to_le_bytes());
+    bytes[4..8].copy_from_slice(&digest.finalize().to_le_bytes());
+    bytes
+}
+
+fn read_renewal<F: ParameterFlash>(flash: &mut F, at: u32) -> Result<[u8; RENEWAL_BYTES], CommitError> {
+    let mut bytes = [0; RENEWAL_BYTES];
+    flash.read(at, &mut bytes).map_err(|_| CommitError::Flash)?;
+    Ok(bytes)
+}
+
+/// The sequence of the last renewal that is whole.
+fn last_renewal<F: ParameterFlash>(flash: &mut F, slot: usize, set_crc: u32) -> Result<Option<u32>, CommitError> {
+    let mut last = None;
+    for at in renewals::<F>(slot) {
+        let bytes = read_renewal(flash, at)?;
+        let sequence = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+        if bytes == renewal(set_crc, sequence) {
+            last = Some(sequence);
+        }
+    }
+    Ok(last)
 }

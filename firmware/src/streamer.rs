@@ -2,7 +2,7 @@
 
 use ballbar::wire::{
     CompiledParameters, Event, MAX_BATCH, MAX_FRAME, MAX_POSE_BATCH, PoseBatch, SampleBatch, Stream, StreamSelection,
-    StreamedPose, ToHost, ToolPose, encode,
+    StreamedPose, ToHost, encode,
 };
 use ballbar::{Sample, SettledPose};
 
@@ -106,7 +106,8 @@ impl Streamer {
 
     fn take_pose(&mut self, sample: &Sample, parameters: &CompiledParameters, sensors: &Sensors, outbox: &mut Outbox) {
         let q = parameters.encoders.q(sample.counts.iter().map(|&counts| counts as f32));
-        let pose = ToolPose::from(&parameters.kinematics.base_from_tool(&q));
+        // One that is no number is not streamed: a gap in the indices.
+        let Some(pose) = parameters.tool_pose(&q) else { return };
         let displacement_m = parameters.lvdt.displacement_m(sample.lvdt).ok();
         let follows = |batch: &PoseBatch| {
             let expected = batch.index.wrapping_add(u32::from(batch.stride) * batch.poses.len() as u32);

@@ -38,6 +38,16 @@ pub struct Pose<S> {
     pub translation_m: Vector3<S>,
 }
 
+/// How far the tool's origin lies from other frames at a pose. Not a number, or infinite, where it cannot be computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent<S> {
+    /// From the base's origin, metres.
+    pub reach_m: S,
+    /// From the farthest origin of all links' frames, metres. Each of these positions is rounded on the way to the base, so this is
+    /// what the error of the pose grows with; frames of nearly parallel axes may lie half a kilometre from a small robot.
+    pub span_m: S,
+}
+
 /// A chain made ready for many poses: all that depends on the parameters alone, computed once.
 #[derive(Clone, Debug)]
 pub struct Kinematics<S> {
@@ -94,6 +104,18 @@ impl<S: Real> Kinematics<S> {
             origin_m = link.point(motion.point(origin_m));
         }
         Pose { rotation: Matrix3::from_columns(&[x_axis, y_axis, x_axis.cross(&y_axis)]), translation_m: origin_m }
+    }
+
+    /// How far the tool's origin lies from the base and from the frames between, at encoder outputs `q`.
+    pub fn extent(&self, q: &JointVector<S>) -> Extent<S> {
+        let motions = self.motions(q);
+        let mut origin_m = self.links[self.joints].translation_m;
+        let mut span_m = origin_m.norm();
+        for (link, motion) in self.links[..self.joints].iter().zip(&motions[..self.joints]).rev() {
+            origin_m = link.point(motion.point(origin_m));
+            span_m = span_m.max(origin_m.norm());
+        }
+        Extent { reach_m: origin_m.norm(), span_m }
     }
 
     /// Position in the base frame of a point of the tool, metres.

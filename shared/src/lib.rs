@@ -31,7 +31,7 @@ pub mod wire;
 
 pub use chain::{Chain, ChainError, Joint, JointKind, JointVector, Link};
 pub use crc32::{crc32, crc32_digest};
-pub use kinematics::{Kinematics, Measurement, Pairing, Pose};
+pub use kinematics::{Extent, Kinematics, Measurement, Pairing, Pose};
 pub use normal::{FreeParameters, FreeParametersError, FreeSetMismatch, NormalEquations};
 pub use parameter::{Parameter, ParameterKind, ParameterUnit, UnknownParameter};
 pub use real::Real;

@@ -52,6 +52,7 @@ pub fn command() -> Of<Command> {
         Just(Command::CurrentPose),
         (which(), few(any::<f32>())).prop_map(|(set, q)| Command::ForwardKinematics { set, q }),
         Just(Command::Reset),
+        Just(Command::ReadPrevious),
     ]
     .boxed()
 }
@@ -75,7 +76,9 @@ fn outcome() -> Of<Result<Answer, Refusal>> {
         any::<u8>().prop_map(|joint| Refusal::Parameters(ParameterSetError::Encoders(EncoderError::Coupling { joint }))),
         any::<(u8, u8)>().prop_map(|(joints, encoders)| Refusal::TooManyJoints { joints, encoders }),
         any::<u32>().prop_map(|staged| Refusal::OtherCrc { staged }),
+        any::<u8>().prop_map(|longest| Refusal::Parameters(ParameterSetError::Reach { longest })),
         Just(Refusal::NoSample),
+        Just(Refusal::NoPrevious),
     ];
     let current = (any::<u64>(), any::<u8>(), few(any::<f32>()), pose(), option::of(any::<f32>()))
         .prop_map(|(t_us, homed, q, pose, displacement_m)| CurrentPose { t_us, homed, q, pose, displacement_m });
@@ -145,8 +148,9 @@ fn status() -> Of<Status> {
         index_errors,
     });
     let channels = (few(encoder), reading(), criteria(), option::of(identity()), [slot(), slot()]);
-    (any::<(u64, u16, [u32; 8])>(), option::of(selection()), channels, option::of(any::<u32>()))
-        .prop_map(|((uptime_us, rate_hz, n), streaming, (encoders, lvdt, criteria, active, slots), staged)| Status {
+    let sets = (option::of(any::<u32>()), option::of(identity()));
+    (any::<(u64, u16, [u32; 8])>(), option::of(selection()), channels, sets)
+        .prop_map(|((uptime_us, rate_hz, n), streaming, (encoders, lvdt, criteria, active, slots), (staged, previous))| Status {
             uptime_us,
             rate_hz,
             streaming,
@@ -164,6 +168,7 @@ fn status() -> Of<Status> {
             staged,
             slots,
             stack_unused_bytes: n[1] ^ n[6],
+            previous,
         })
         .boxed()
 }

@@ -45,15 +45,16 @@ pub fn two_joints() -> ParameterSet {
     }
 }
 
-/// The longest set that there can be: everything full, and every number that varies in size at its largest.
+/// The longest set that there can be: everything full, and every number that varies in size at its largest. Its eight slides of a
+/// metre make sense.
 pub fn largest() -> ParameterSet {
     ParameterSet {
         name: "n".repeat(32).as_str().try_into().unwrap(),
         is_calibrated: true,
         kinds: core::iter::repeat_n(JointKind::Prismatic, 8).collect(),
-        parameters: core::iter::repeat_n(f32::MIN_POSITIVE, 70).collect(),
+        parameters: core::iter::repeat_n(1.0, 70).collect(),
         encoders: core::iter::repeat_n(Encoder { counts_per_unit: -1.5, counts_per_index: u32::MAX }, 8).collect(),
-        couplings: core::iter::repeat_n(Coupling { joint: 7, driven_by: 6, ratio: f32::MAX }, 8).collect(),
+        couplings: core::iter::repeat_n(Coupling { joint: 7, driven_by: 6, ratio: -0.5 }, 8).collect(),
         lvdt: LvdtCurve { code_min: 60_000, code_max: u16::MAX, ..curve() },
     }
 }

@@ -123,6 +123,20 @@ pub fn keeps_parameters_over_a_reset(bench: &dyn Bench, plant: &Plant) {
     assert_eq!(bytes_of(&active_set(bench)), stored);
 }
 
+/// What the last upload replaced comes back, over a reset too, and once more undoes it.
+pub fn brings_back_the_parameters_before(bench: &dyn Bench) {
+    const OTHER: &str = "puma560";
+    let first = host_cal_run(bench, "status", &[]).json()["robot"]["crc"].clone();
+    let second = host_cal(bench, "apply", &["--robot", OTHER, "--uncalibrated", "--vectors", "20"])["crc"].clone();
+    assert_ne!(first, second);
+    for (back, away) in [(&first, &second), (&second, &first), (&first, &second)] {
+        let report = host_cal(bench, "apply", &["--previous", "--vectors", "50"]);
+        assert_eq!((&report["crc"], &report["replaced_crc"]), (back, away));
+    }
+    let status = host_cal_run(bench, "status", &["--reset"]).json();
+    assert_eq!((&status["robot"]["crc"], &status["previous"]["crc"]), (&first, &second));
+}
+
 fn connect(bench: &dyn Bench) -> BoardLink {
     BoardLink::connect(&bench.port(), BAUD).unwrap_or_else(|error| panic!("{error}"))
 }

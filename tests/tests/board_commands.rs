@@ -1,7 +1,10 @@
 //! Every command of the board: what it does, and each of its refusals.
 
-use ballbar::wire::{Answer, Command, ParameterSet, ParameterSetError, Refusal, SlotState, StreamSelection, ToolPose, WhichSet};
-use ballbar::{EncoderError, Kinematics, LvdtCurve, LvdtReading, Stillness, StillnessCriteria};
+use ballbar::wire::{
+    Answer, Check, Command, ParameterSet, ParameterSetError, Refusal, SlotState, StreamSelection, ToolPose, WhichSet,
+};
+use ballbar::{Coupling, Encoder, EncoderError, Kinematics, LvdtCurve, LvdtReading, Stillness, StillnessCriteria};
+use ballbar_firmware::Slots;
 use ballbar_tests::fake_board::FakeBoard;
 use ballbar_tests::fake_hardware::empty_memory;
 use ballbar_tests::parameter_sets::{calibrated_puma, curve, largest, puma};
@@ -137,12 +140,65 @@ fn parameters_that_cannot_be_used_are_refused_and_what_was_staged_stays() {
             wrong(ParameterSetError::Encoders(bad_coupling)),
         ),
         (changed(&|set| set.lvdt.code_max = 0), wrong(ParameterSetError::Lvdt)),
+        (changed(&|set| set.lvdt.coefficients_m = [0.0; 6]), wrong(ParameterSetError::Lvdt)),
+        (changed(&|set| set.parameters[16] = 3.4e38), wrong(ParameterSetError::Reach { longest: 16 })),
+        (changed(&|set| set.parameters[18] = 432.0), wrong(ParameterSetError::Reach { longest: 18 })),
+        (changed(&|set| set.parameters[19] = 1e30), wrong(ParameterSetError::Implausible { index: 19 })),
+        (changed(&|set| set.parameters[7] = 0.0), wrong(ParameterSetError::Implausible { index: 7 })),
+        (changed(&|set| set.couplings[0].ratio = 1e30), wrong(ParameterSetError::Encoders(EncoderError::Coupling { joint: 5 }))),
         (largest(), Refusal::TooManyJoints { joints: 8, encoders: 6 }),
     ];
     for (set, refusal) in cases {
         assert_eq!(board.ask(Command::WriteParameters(set)), Err(refusal));
         assert_eq!(board.ask(Command::ReadParameters(WhichSet::Staged)), Ok(Answer::Parameters(calibrated_puma())));
     }
+}
+
+/// Written into flash by whatever did not ask: it is not taken into use, and neither is the set before it, but that can be had.
+#[test]
+fn parameters_in_flash_that_cannot_be_used_are_not_taken_into_use() {
+    for (index, value) in [(0, 3.4e38), (16, 1e30), (3, 1e30), (7, 0.0), (50, 432.0)] {
+        let mut absurd = calibrated_puma();
+        absurd.parameters[index] = value;
+        let mut flash = puma_board().machine().flash.clone();
+        Slots::load(&mut flash).0.commit(&mut flash, &absurd).unwrap();
+        let mut board = FakeBoard::on(flash).settle_in();
+        assert_eq!(board.greet().active, None);
+        assert_eq!(board.ask(Command::CurrentPose), Err(Refusal::NoParameters));
+        let Ok(Answer::SelfTest(test)) = board.ask(Command::SelfTest) else { panic!("no self-test") };
+        assert!(test.results.iter().any(|result| result.check == Check::Parameters && !result.passed));
+
+        assert_eq!(board.ask(Command::ReadPrevious), Ok(Answer::Parameters(puma())));
+        assert_eq!(board.commit(&puma()), Ok(Answer::Done));
+        assert_eq!(board.status().active.map(|active| active.sequence), Some(2));
+    }
+}
+
+#[test]
+fn what_was_in_use_before_can_be_read_and_committed_again() {
+    let mut board = FakeBoard::on(MockFlash::<4>::new(1)).settle_in();
+    assert_eq!(board.ask(Command::ReadPrevious), Err(Refusal::NoPrevious));
+    board.commit(&puma()).unwrap();
+    assert_eq!(board.ask(Command::ReadPrevious), Err(Refusal::NoPrevious), "both slots hold the same");
+    assert_eq!(board.status().previous, None);
+    board.commit(&calibrated_puma()).unwrap();
+    for i in 0..3 {
+        let (now, before) = if i % 2 == 0 { (calibrated_puma(), puma()) } else { (puma(), calibrated_puma()) };
+        let status = board.status();
+        let (active, previous) = (status.active.unwrap(), status.previous.unwrap());
+        assert_eq!((active.name, active.is_calibrated, active.sequence), (now.name, now.is_calibrated, i + 1));
+        assert_eq!((&previous.name, previous.is_calibrated, previous.joints), (&before.name, before.is_calibrated, 6));
+        assert_eq!(previous.crc, ballbar::crc32(&postcard::to_stdvec(&before).unwrap()));
+        assert_eq!(board.ask(Command::ReadPrevious), Ok(Answer::Parameters(before.clone())));
+        assert_eq!(board.commit(&before), Ok(Answer::Done));
+        assert_eq!(board.ask(Command::ReadParameters(WhichSet::Active)), Ok(Answer::Parameters(before)));
+    }
+    // Over a reset too.
+    let flash = board.machine().flash.clone();
+    let mut board = FakeBoard::on(flash).settle_in();
+    assert_eq!(board.status().previous.map(|previous| previous.name), Some(calibrated_puma().name));
+    board.machine().flash.trouble = Trouble::Read;
+    assert_eq!(board.ask(Command::ReadPrevious), Err(Refusal::Flash));
 }
 
 #[test]
@@ -283,6 +339,38 @@ fn forward_kinematics_is_that_of_the_set_asked_for() {
     }
     for bad in [f32::NAN, f32::INFINITY] {
         assert_eq!(board.ask(ask(WhichSet::Active, &[0.0, 0.0, bad, 0.0, 0.0, 0.0])), Err(Refusal::NotFinite));
+    }
+}
+
+/// Six slides that drive each other on as hard as is taken.
+fn slides() -> ParameterSet {
+    let set = largest();
+    ParameterSet {
+        kinds: set.kinds[..6].iter().copied().collect(),
+        parameters: set.parameters[..54].iter().copied().collect(),
+        encoders: core::iter::repeat_n(Encoder { counts_per_unit: 1.0, counts_per_index: 0 }, 6).collect(),
+        couplings: (1..6).map(|joint| Coupling { joint, driven_by: joint - 1, ratio: 1e4 }).collect(),
+        ..set
+    }
+}
+
+#[test]
+fn a_pose_that_is_no_number_is_refused() {
+    let mut board = FakeBoard::new().settle_in();
+    board.commit(&slides()).unwrap();
+    let ask = |q: f32| Command::ForwardKinematics { set: WhichSet::Active, q: [q; 6].into() };
+    assert!(matches!(board.ask(ask(1e6)), Ok(Answer::Pose(_))));
+    assert_eq!(board.ask(ask(f32::MAX)), Err(Refusal::NotFinite));
+}
+
+#[test]
+fn the_current_pose_is_a_number_wherever_the_encoders_stand() {
+    let mut board = FakeBoard::new().settle_in();
+    board.commit(&slides()).unwrap();
+    for counts in [i32::MIN, i32::MAX] {
+        (0..6).for_each(|joint| assert!(board.ask(Command::PresetEncoder { joint, counts }).is_ok()));
+        let Ok(Answer::CurrentPose(found)) = board.ask(Command::CurrentPose) else { panic!("no pose") };
+        assert!(found.q.iter().chain(&found.pose.position_m).all(|value| value.is_finite()), "{found:?}");
     }
 }
 

@@ -127,6 +127,74 @@ fn apply_refuses_what_should_not_be_on_a_board_and_keeps_what_is_there() {
     }
 }
 
+#[test]
+fn apply_previous_brings_back_what_the_last_commit_replaced_and_again_undoes_it() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let _board = bare_board(folder);
+    refused(
+        folder,
+        &["apply", "port", "--previous"],
+        &["holds no parameters other than those in use", "host-cal apply PORT --robot"],
+    );
+    let design = good(folder, &["apply", "port", "--robot", "puma560", "--uncalibrated", "--json"]).json();
+    assert!(run(folder, &["status", "port", "--json"]).json()["previous"].is_null(), "both places hold the same");
+    refused(folder, &["apply", "port", "--previous"], &["holds no parameters other than those in use"]);
+
+    calibrated(folder);
+    let new = good(folder, &["apply", "port", "--robot", "calibrated.toml", "--json"]).json();
+    // The same once more costs nothing.
+    good(folder, &["apply", "port", "--robot", "calibrated.toml"]);
+    let status = run(folder, &["status", "port", "--json"]).json();
+    assert_eq!((&status["previous"]["crc"], &status["previous"]["calibrated"]), (&design["crc"], &false.into()));
+    assert!(run(folder, &["status", "port"]).stdout.contains("host-cal apply PORT --previous"));
+
+    for i in 0..3 {
+        let (back, away) = if i % 2 == 0 { (&design, &new) } else { (&new, &design) };
+        let report = good(folder, &["apply", "port", "--previous", "--json"]).json();
+        assert_eq!((&report["crc"], &report["calibrated"]), (&back["crc"], &back["calibrated"]));
+        assert_eq!((&report["replaced_crc"], &report["replaced_calibrated"]), (&away["crc"], &away["calibrated"]));
+        assert!(report["vectors"] == 1000 && report["max_position_difference_um"].as_f64().unwrap() < 1.0, "{report}");
+        let status = run(folder, &["status", "port", "--reset", "--json"]).json();
+        assert_eq!((&status["robot"]["crc"], &status["previous"]["crc"]), (&back["crc"], &away["crc"]));
+        assert_eq!(status["robot"]["sequence"], report["sequence"]);
+        assert_eq!(status["staged_crc"], serde_json::Value::Null);
+    }
+    let text = good(folder, &["apply", "port", "--previous", "--vectors", "5"]).stdout;
+    assert!(text.contains("calibrated robot") && text.contains("in place of UNCALIBRATED"), "{text}");
+    for with in ["--robot=puma560", "--uncalibrated"] {
+        refused(folder, &["apply", "port", "--previous", with], &["cannot be used with"]);
+    }
+    refused(folder, &["apply", "port"], &["--robot"]);
+}
+
+#[test]
+fn apply_refuses_numbers_that_no_robot_has_before_it_speaks_to_the_board() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let robot = robot_of_joints(6);
+    let cases = [
+        // Millimetres of millimetres; a slip of the decimal point of an encoder; half a kilometre that cancels.
+        (robot.replace("100.0]", "432000.0]"), "the tool comes more than 100 m away from the base; the largest length is z"),
+        (robot.replace("counts_per_rev = 8192", "counts_per_rev = 1e12"), "joint 1: counts per radian or metre must be"),
+        (robot.replace("offset_deg = 0.0", "offset_deg = 9e5"), "offset1 is out of range"),
+        (slid_by_half_a_kilometre(), "in single precision, as the board computes, poses are off by up to"),
+    ];
+    for (text, words) in cases {
+        std::fs::write(folder.join("odd.toml"), text).unwrap();
+        refused(folder, &["apply", "no-such-port", "--robot", "odd.toml", "--uncalibrated"], &["odd.toml", words]);
+    }
+}
+
+/// The same robot twice: joint 2's frame stands where it is, or 574 m along its axis.
+fn slid_by_half_a_kilometre() -> String {
+    let (near, axis) = (robot_of_joints(6), "translation_mm = [10.0, 0.0, 100.0]");
+    let mut links = near.splitn(4, axis);
+    let parts: Vec<&str> = links.by_ref().collect();
+    let moved = ["translation_mm = [574010.0, 0.0, 100.0]", "translation_mm = [10.0, 0.0, -573900.0]"];
+    [parts[0], axis, parts[1], moved[0], parts[2], moved[1], parts[3]].concat()
+}
+
 /// A robot file of equal revolute joints with encoders.
 fn robot_of_joints(joints: usize) -> String {
     let link = "[[links]]\ntranslation_mm = [10.0, 0.0, 100.0]\nrotation_deg = [0.0, 90.0, 0.0]\n";

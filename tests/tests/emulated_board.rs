@@ -50,6 +50,8 @@ fn a_board_serves_its_host() {
     scenarios::greets_the_host(&bench);
     scenarios::keeps_parameters_over_a_reset(&bench, &plant);
     assert_eq!(bench.0.own_resets(), 1);
+    scenarios::brings_back_the_parameters_before(&bench);
+    assert_eq!(bench.0.own_resets(), 2);
     scenarios::home_at_rest(&bench, &plant);
     streams_a_minute(&bench);
     loses_damaged_frames_only(&bench);
@@ -100,7 +102,7 @@ fn samples_of(message: &ballbar::wire::Stream) -> Vec<ballbar::Sample> {
 /// A plant that is out of step makes the driver panic; the next hello says where and why.
 fn tells_of_a_panic(bench: &Emulated) {
     bench.0.answer_nonsense();
-    bench.0.wait_for_own_resets(2);
+    bench.0.wait_for_own_resets(3);
     let started_by = started_by(bench);
     assert!(started_by.starts_with("a PANIC of the firmware: plant_link.rs:"), "{started_by}");
     assert!(started_by.ends_with("plant out of step: flags 0x80"), "{started_by}");

@@ -59,7 +59,7 @@ fn anything_on_the_link_of_a_board() {
             1 => bytes.chunks(usize::from(kind / 3) % 40 + 1).for_each(|payload| board.send_payload(payload)),
             _ => {
                 for (id, command) in bytes.chunks(usize::from(kind / 3) % 40 + 1).enumerate() {
-                    board.send_payload(&[&[1, id as u8 % 128, command[0] % 15], &command[1..]].concat());
+                    board.send_payload(&[&[1, id as u8 % 128, command[0] % 16], &command[1..]].concat());
                 }
             }
         }

@@ -77,10 +77,10 @@ fn a_power_cut_at_any_byte_leaves_the_old_set_or_the_new_one_with_words_of_8_byt
 /// The next commit is cut as well, and the one after it.
 #[test]
 fn cuts_in_a_row_never_lose_the_set_that_was_committed_last() {
-    for bytes in (0..1_500).step_by(7) {
+    for bytes in (0..2_100).step_by(11) {
         let mut flash = flash_after::<4>(3);
         for i in 0..4 {
-            flash.trouble = Trouble::CutAfter { bytes: (bytes + 311 * i) % 1_500, debris: Debris::Random };
+            flash.trouble = Trouble::CutAfter { bytes: (bytes + 311 * i) % 2_100, debris: Debris::Random };
             let is_committed = Slots::load(&mut flash).0.commit(&mut flash, &sets()[3]).is_ok();
             flash.trouble = Trouble::None;
             assert_eq!(stored(&mut flash).as_ref(), Some(&sets()[if is_committed { 3 } else { 2 }]), "{bytes}");
@@ -152,7 +152,7 @@ fn a_commit_to_a_flash_that_cannot_be_read_leaves_the_old_set() {
 #[test]
 fn a_first_commit_whose_second_slot_fails_is_a_commit_without_its_copy() {
     let mut flash = MockFlash::<4>::new(0);
-    flash.trouble = Trouble::CutAfter { bytes: 1_800, debris: Debris::Mixture };
+    flash.trouble = Trouble::CutAfter { bytes: 2_800, debris: Debris::Mixture };
     let (mut slots, _) = Slots::load(&mut flash);
     assert_eq!(slots.commit(&mut flash, &puma()), Ok(()));
     assert!(matches!(slots.states(), [SlotState::Good { .. }, SlotState::Damaged]));
@@ -168,7 +168,7 @@ fn a_slot_that_rotted_since_the_start_is_the_one_that_is_written() {
     whole.memory[MockFlash::<4>::SLOT_BYTES as usize + 50] ^= 4;
     let old = sets()[0].clone();
     assert_eq!(stored(&mut whole).as_ref(), Some(&old));
-    for bytes in 0..1_000 {
+    for bytes in 0..1_500 {
         let mut flash = whole.clone();
         flash.trouble = Trouble::CutAfter { bytes, debris: Debris::Random };
         assert!(slots.commit(&mut flash, &largest()).is_err());
@@ -199,6 +199,160 @@ fn set_sequence(flash: &mut MockFlash<4>, slot: usize, sequence: u32) {
     image[8..12].copy_from_slice(&sequence.to_le_bytes());
     let crc = ballbar::crc32(&[&image[..16], &image[20..20 + length]].concat());
     image[16..20].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// Flash with the second set in use and the first in the other slot.
+fn flash_with_a_previous<const WORD: usize>() -> MockFlash<WORD> {
+    let flash = flash_after::<WORD>(2);
+    assert_eq!(previous(&mut flash.clone()), Some(puma()));
+    flash
+}
+
+fn previous(flash: &mut impl ParameterFlash) -> Option<ParameterSet> {
+    Slots::load(flash).0.read_previous(flash).map(|(_, _, set)| set)
+}
+
+/// Stores what was in use before.
+fn go_back(flash: &mut impl ParameterFlash) -> Result<(), CommitError> {
+    let set = previous(flash).expect("nothing was in use before");
+    Slots::load(flash).0.commit(flash, &set)
+}
+
+#[test]
+fn the_set_before_comes_back_and_the_two_change_places_every_time() {
+    let mut flash = flash_with_a_previous::<4>();
+    // More often than there is room for renewals: the slots are then written anew.
+    for i in 0..80 {
+        let (back, away) = if i % 2 == 0 { (puma(), two_joints()) } else { (two_joints(), puma()) };
+        assert_eq!(go_back(&mut flash), Ok(()));
+        assert_eq!((stored(&mut flash), previous(&mut flash)), (Some(back), Some(away)), "{i}");
+        assert_eq!(Slots::load(&mut flash).0.active().map(|(sequence, _)| sequence), Some(2 + i));
+    }
+    Slots::load(&mut flash).0.commit(&mut flash, &largest()).unwrap();
+    assert_eq!((stored(&mut flash), previous(&mut flash)), (Some(largest()), Some(two_joints())));
+}
+
+/// Neither set is lost, whichever byte the power fails at, and after that it goes on as if nothing had been.
+fn cut_everywhere_on_the_way_back<const WORD: usize>() {
+    let before = flash_with_a_previous::<WORD>();
+    let mut whole = before.clone();
+    go_back(&mut whole).unwrap();
+    let bytes_changed = whole.bytes_changed - before.bytes_changed;
+    assert_eq!(bytes_changed, 32, "nothing is to be erased");
+    for debris in Debris::ALL {
+        for bytes in 0..bytes_changed {
+            let mut flash = before.clone();
+            flash.trouble = Trouble::CutAfter { bytes, debris };
+            let outcome = go_back(&mut flash);
+            flash.trouble = Trouble::None;
+            let (now, other) = (stored(&mut flash), previous(&mut flash));
+            let sets = if now == Some(puma()) { (puma(), two_joints()) } else { (two_joints(), puma()) };
+            assert_eq!((now, other), (Some(sets.0), Some(sets.1)), "cut after {bytes} bytes ({debris:?})");
+            assert!(outcome.is_err() || stored(&mut flash) == Some(puma()));
+            let then = previous(&mut flash);
+            go_back(&mut flash).unwrap_or_else(|error| panic!("no way back after a cut after {bytes} bytes: {error:?}"));
+            assert_eq!(stored(&mut flash), then);
+        }
+    }
+}
+
+#[test]
+fn a_power_cut_at_any_byte_of_the_way_back_leaves_both_sets() {
+    cut_everywhere_on_the_way_back::<1>();
+    cut_everywhere_on_the_way_back::<4>();
+    cut_everywhere_on_the_way_back::<8>();
+    cut_everywhere_on_the_way_back::<32>();
+}
+
+/// When all room for renewals is used, the slot is written anew: one of the two sets is whole at any byte.
+#[test]
+fn a_power_cut_at_any_byte_of_a_way_back_without_room_leaves_the_set_in_use() {
+    let mut before = flash_with_a_previous::<4>();
+    let mut next = before.clone();
+    go_back(&mut next).unwrap();
+    while next.bytes_changed - before.bytes_changed < 1_000 {
+        before = next.clone();
+        go_back(&mut next).unwrap();
+    }
+    let old = stored(&mut before);
+    let mut whole = before.clone();
+    go_back(&mut whole).unwrap();
+    let bytes_changed = whole.bytes_changed - before.bytes_changed;
+    assert!(bytes_changed > 1_500, "{bytes_changed}");
+    for bytes in 0..bytes_changed {
+        let mut flash = before.clone();
+        flash.trouble = Trouble::CutAfter { bytes, debris: Debris::Random };
+        assert!(go_back(&mut flash).is_err());
+        flash.trouble = Trouble::None;
+        assert_eq!(stored(&mut flash), old, "cut after {bytes} bytes");
+    }
+}
+
+#[test]
+fn the_only_set_that_there_ever_was_has_none_before_it() {
+    assert_eq!(previous(&mut MockFlash::<4>::new(0)), None);
+    assert_eq!(previous(&mut flash_after::<4>(1)), None);
+}
+
+/// Whoever uploads the same file twice does not lose the set before it.
+#[test]
+fn a_commit_of_the_set_in_use_writes_nothing() {
+    let mut flash = flash_with_a_previous::<4>();
+    let bytes_changed = flash.bytes_changed;
+    Slots::load(&mut flash).0.commit(&mut flash, &two_joints()).unwrap();
+    assert_eq!((flash.bytes_changed, previous(&mut flash)), (bytes_changed, Some(puma())));
+}
+
+#[test]
+fn a_way_back_that_the_flash_refuses_costs_neither_set() {
+    for trouble in [Trouble::Write { words: 0 }, Trouble::Write { words: 1 }, Trouble::StuckBit] {
+        let mut flash = flash_with_a_previous::<4>();
+        let mut slots = Slots::load(&mut flash).0;
+        flash.trouble = trouble;
+        assert!(slots.commit(&mut flash, &puma()).is_err());
+        flash.trouble = Trouble::None;
+        assert_eq!((stored(&mut flash), previous(&mut flash)), (Some(two_joints()), Some(puma())), "{trouble:?}");
+        assert_eq!(slots.commit(&mut flash, &puma()), Ok(()), "the flash recovered, and still no way back");
+        assert_eq!((stored(&mut flash), previous(&mut flash)), (Some(puma()), Some(two_joints())));
+    }
+}
+
+/// All that matters was written before the flash failed: refused, it would be in use after the next start all the same.
+#[test]
+fn a_way_back_that_reads_back_counts_whatever_the_flash_says() {
+    let mut flash = flash_with_a_previous::<4>();
+    flash.trouble = Trouble::Write { words: 3 };
+    assert_eq!(go_back(&mut flash), Ok(()));
+    flash.trouble = Trouble::None;
+    assert_eq!((stored(&mut flash), previous(&mut flash)), (Some(puma()), Some(two_joints())));
+}
+
+#[test]
+fn any_one_flipped_bit_after_a_way_back_leaves_one_of_the_two_sets() {
+    let mut whole = flash_with_a_previous::<4>();
+    go_back(&mut whole).unwrap();
+    for bit in 0..8 * MockFlash::<4>::BYTES {
+        let mut flash = whole.clone();
+        flash.memory[bit / 8] ^= 1 << (bit % 8);
+        let found = stored(&mut flash).unwrap_or_else(|| panic!("nothing is left after a flip of bit {bit}"));
+        assert!(found == puma() || found == two_joints(), "bit {bit}: {found:?}");
+    }
+}
+
+#[test]
+fn a_slot_without_room_for_renewals_is_written_anew() {
+    // As flash of the firmware before was: what it wrote is read, and its slot has no renewals.
+    let mut flash = MemoryFlash::new([0xff; 4096]);
+    for set in [puma(), two_joints()] {
+        Slots::load(&mut flash).0.commit(&mut flash, &set).unwrap();
+    }
+    let mut memory = *flash.memory();
+    memory[1024..2048].fill(0);
+    memory[3072..].fill(0);
+    let mut flash = MemoryFlash::new(memory);
+    assert_eq!((stored(&mut flash), previous(&mut flash)), (Some(two_joints()), Some(puma())));
+    go_back(&mut flash).unwrap();
+    assert_eq!((stored(&mut flash), previous(&mut flash)), (Some(puma()), Some(two_joints())));
 }
 
 #[test]

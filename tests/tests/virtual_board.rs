@@ -29,6 +29,7 @@ fn a_board_serves_its_host() {
     let mut bench = Virtual(VirtualBoard::start(options).unwrap());
     scenarios::greets_the_host(&bench);
     scenarios::keeps_parameters_over_a_reset(&bench, &plant);
+    scenarios::brings_back_the_parameters_before(&bench);
     scenarios::home_at_rest(&bench, &plant);
 
     let script = scenarios::script(12, 4.5, 3);

@@ -111,8 +111,9 @@ fn the_longest_status_fits_into_a_frame() {
         staged: Some(u32::MAX),
         slots: [SlotState::Good { sequence: u32::MAX, crc: u32::MAX }; 2],
         stack_unused_bytes: u32::MAX,
+        previous: Some(longest_identity()),
     };
-    insta::assert_snapshot!(payload_bytes(&reply(Answer::Status(status))), @"292");
+    insta::assert_snapshot!(payload_bytes(&reply(Answer::Status(status))), @"338");
 }
 
 #[test]

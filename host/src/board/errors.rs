@@ -1,5 +1,6 @@
 //! What can go wrong between the host and a board.
 
+use ballbar::LvdtCurve;
 use ballbar::wire::{ProtocolVersion, Refusal};
 use miette::Diagnostic;
 use thiserror::Error;
@@ -129,8 +130,8 @@ fn refusal_text(refusal: &Refusal) -> String {
         Refusal::Stillness => "a pose must hold for 10 ms to 60 s".into(),
         Refusal::NothingSelected => "nothing was selected to stream".into(),
         Refusal::Joint { joints } => format!("there are {joints} joints"),
-        Refusal::NotFinite => "a value is no finite number".into(),
-        Refusal::LvdtCurve => "the LVDT curve has no range of codes or no finite coefficients".into(),
+        Refusal::NotFinite => "a value or the pose is no finite number".into(),
+        Refusal::LvdtCurve => LvdtCurve::VALID.into(),
         Refusal::Parameters(error) => error.to_string(),
         Refusal::TooManyJoints { joints, encoders } => format!("the robot has {joints} joints, the board {encoders} encoders"),
         Refusal::NoParameters => "it holds no parameters".into(),
@@ -139,6 +140,7 @@ fn refusal_text(refusal: &Refusal) -> String {
         Refusal::Moving => "storing stops the sampling for half a second, and the robot is moving".into(),
         Refusal::Flash => "its flash could not be written; the old parameters are still in use".into(),
         Refusal::NoSample => "it has not taken a sample yet".into(),
+        Refusal::NoPrevious => "its flash holds no parameters other than those in use".into(),
     }
 }
 
@@ -147,6 +149,9 @@ fn refusal_help(refusal: &Refusal) -> &'static str {
         Refusal::HelloFirst => "Try again.",
         Refusal::NoParameters => "Upload a robot first: host-cal apply PORT --robot calibrated.toml",
         Refusal::Streaming => "End the stream first: another host-cal may be running.",
+        Refusal::NoPrevious => {
+            "Only what the last commit replaced can be brought back. Upload a robot's file: host-cal apply PORT --robot robot.toml"
+        }
         Refusal::Moving => "Let the robot stand still, and try again.",
         Refusal::Flash => "Try again; if it stays so, the flash is worn out.",
         _ => "Nothing was changed.",

@@ -329,6 +329,7 @@ fn command_name(command: &Command) -> &'static str {
         Command::WriteParameters(_) => "write parameters",
         Command::ReadParameters(WhichSet::Active) => "read parameters",
         Command::ReadParameters(WhichSet::Staged) => "read staged parameters",
+        Command::ReadPrevious => "read previous parameters",
         Command::Commit { .. } => "commit",
         Command::Discard => "discard",
         Command::CurrentPose => "current pose",

@@ -18,4 +18,4 @@ pub use plausible::Implausible;
 pub use port::{BAUD, Port};
 pub use robot_on_board::{NOMINAL_TRAVEL_M, RobotOnBoard, SetError, nominal_lvdt, parameter_set};
 pub use tally::{Refusals, RefusedMessages, StreamLosses};
-pub use verify::{KinematicsDifference, rms_kinematics, verify_kinematics};
+pub use verify::{KinematicsDifference, rms_kinematics, rounding_of_kinematics, verify_kinematics};

@@ -16,8 +16,9 @@ pub enum SetError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Encoders(#[from] NoEncoders),
-    /// A number is too large for the board's single precision.
+    /// The board would refuse it.
     #[error("{robot}: {reason}")]
+    #[diagnostic(help("The board would refuse it. docs/files.md says what each number means, and in which unit."))]
     Unfit {
         /// The file.
         robot: String,
@@ -52,7 +53,9 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
     if robot.encoders.iter().map(|facts| facts.couplings.len()).sum::<usize>() > ballbar::MAX_COUPLINGS {
         return Err(unfit(format!("more than {} couplings", ballbar::MAX_COUPLINGS)));
     }
-    set.compile().map_err(|error| unfit(error.to_string()))?;
+    // First as the board does, which does not know the limits, and then over what the limits let the robot do.
+    let ranges: Vec<_> = robot.limits.iter().map(|limits| limits.min as f32..=limits.max as f32).collect();
+    set.compile().and_then(|_| set.compile_within(&ranges)).map_err(|error| unfit(error.to_string()))?;
     Ok(set)
 }
 

@@ -1,13 +1,13 @@
 //! Whether the board computes what the host computes.
 
-use ballbar::wire::{Answer, Command, ToolPose, WhichSet};
-use ballbar::{JointVector, Kinematics, MAX_JOINTS, Pose, Vector3};
+use ballbar::wire::{Answer, Command, CompiledParameters, ToolPose, WhichSet};
+use ballbar::{Chain, JointVector, Kinematics, MAX_JOINTS, Pose, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::errors::BoardError;
 use super::link::BoardLink;
-use crate::files::Robot;
+use crate::files::{JointLimits, Robot};
 
 /// The largest differences between the board's poses, in f32, and the host's, in f64 from the robot's file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,6 +28,14 @@ impl KinematicsDifference {
     pub fn is_small(&self) -> bool {
         self.position_m <= 1e-6 * self.reach_m.max(1.0) && self.axis_rad <= 1.5e-6
     }
+
+    fn take(&mut self, found: &ToolPose, expected: &Pose<f64>) {
+        let axis = |found: [f32; 3], i: usize| (wide(found) - expected.rotation.column(i)).norm();
+        self.vectors += 1;
+        self.position_m = larger(self.position_m, (wide(found.position_m) - expected.translation_m).norm());
+        self.axis_rad = larger(self.axis_rad, larger(axis(found.x_axis, 0), axis(found.y_axis, 1)));
+        self.reach_m = self.reach_m.max(expected.translation_m.norm());
+    }
 }
 
 /// Compares at `vectors` random joint vectors within the joint limits; the same every time.
@@ -36,22 +44,34 @@ impl KinematicsDifference {
 /// [`BoardError`].
 pub fn verify_kinematics(
     link: &mut BoardLink,
-    robot: &Robot,
+    chain: &Chain<f64>,
+    limits: &[JointLimits],
     set: WhichSet,
     vectors: usize,
     mut on_vector: impl FnMut(),
 ) -> Result<KinematicsDifference, BoardError> {
-    let mut difference = KinematicsDifference { vectors, ..KinematicsDifference::default() };
-    for (pose, expected) in poses_of_both(link, robot, set, vectors) {
-        let pose = pose?;
-        let axis = |found: [f32; 3], i: usize| (wide(found) - expected.rotation.column(i)).norm();
-        let position_m = (wide(pose.position_m) - expected.translation_m).norm();
-        difference.position_m = larger(difference.position_m, position_m);
-        difference.axis_rad = larger(difference.axis_rad, larger(axis(pose.x_axis, 0), axis(pose.y_axis, 1)));
-        difference.reach_m = difference.reach_m.max(expected.translation_m.norm());
+    let mut difference = KinematicsDifference::default();
+    for (q, expected) in random_poses(chain, limits, vectors) {
+        difference.take(&board_pose(link, set, q)?, &expected);
         on_vector();
     }
     Ok(difference)
+}
+
+/// What single precision alone makes of the poses: the same comparison with the board's own arithmetic, done here.
+pub fn rounding_of_kinematics(
+    chain: &Chain<f64>,
+    limits: &[JointLimits],
+    compiled: &CompiledParameters,
+    vectors: usize,
+) -> KinematicsDifference {
+    let mut difference = KinematicsDifference::default();
+    for (q, expected) in random_poses(chain, limits, vectors) {
+        let mut vector = JointVector::zero();
+        vector.as_array_mut()[..q.len()].copy_from_slice(&q);
+        difference.take(&ToolPose::from(&compiled.kinematics.base_from_tool(&vector)), &expected);
+    }
+    difference
 }
 
 /// RMS distance, metres, between the tool's position as the board computes it with its stored parameters and as `truth` has it, at
@@ -61,37 +81,36 @@ pub fn verify_kinematics(
 /// [`BoardError`].
 pub fn rms_kinematics(link: &mut BoardLink, truth: &Robot, vectors: usize) -> Result<f64, BoardError> {
     let mut squares = 0.0;
-    for (pose, expected) in poses_of_both(link, truth, WhichSet::Active, vectors) {
-        squares += (wide(pose?.position_m) - expected.translation_m).norm_squared();
+    for (q, expected) in random_poses(&truth.chain, &truth.limits, vectors) {
+        let pose = board_pose(link, WhichSet::Active, q)?;
+        squares += (wide(pose.position_m) - expected.translation_m).norm_squared();
     }
     Ok((squares / vectors as f64).sqrt())
 }
 
-/// The board's pose and the robot's at random joint vectors within the robot's limits.
-fn poses_of_both<'a>(
-    link: &'a mut BoardLink,
-    robot: &'a Robot,
-    set: WhichSet,
-    vectors: usize,
-) -> impl Iterator<Item = (Result<ToolPose, BoardError>, Pose<f64>)> + 'a {
-    let kinematics = Kinematics::new(&robot.chain);
+/// Encoder outputs as they travel.
+type WireVector = heapless::Vec<f32, MAX_JOINTS>;
+
+/// Random joint vectors within the limits, and the poses of the chain there.
+fn random_poses(chain: &Chain<f64>, limits: &[JointLimits], vectors: usize) -> impl Iterator<Item = (WireVector, Pose<f64>)> {
+    let kinematics = Kinematics::new(chain);
     let mut rng = ChaCha8Rng::seed_from_u64(560);
     (0..vectors).map(move |_| {
         // Rounded first: the joint values are the same for both.
-        let q: heapless::Vec<f32, MAX_JOINTS> =
-            robot.limits.iter().map(|limits| rng.random_range(limits.min..=limits.max) as f32).collect();
+        let q: WireVector = limits.iter().map(|limits| rng.random_range(limits.min..=limits.max) as f32).collect();
         let mut vector = JointVector::zero();
         for (exact, rounded) in vector.as_array_mut().iter_mut().zip(&q) {
             *exact = f64::from(*rounded);
         }
-        let expected = kinematics.base_from_tool(&vector);
-        let pose = match link.request(Command::ForwardKinematics { set, q }) {
-            Ok(Answer::Pose(pose)) => Ok(pose),
-            Ok(_) => Err(BoardError::WrongAnswer { command: "forward kinematics" }),
-            Err(error) => Err(error),
-        };
-        (pose, expected)
+        (q, kinematics.base_from_tool(&vector))
     })
+}
+
+fn board_pose(link: &mut BoardLink, set: WhichSet, q: WireVector) -> Result<ToolPose, BoardError> {
+    match link.request(Command::ForwardKinematics { set, q })? {
+        Answer::Pose(pose) => Ok(pose),
+        _ => Err(BoardError::WrongAnswer { command: "forward kinematics" }),
+    }
 }
 
 /// What is not a number is larger than any: `f64::max` would pass over it.

@@ -4,7 +4,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ballbar::Stillness;
-use ballbar::wire::{Answer, BoardHello, Check, Command, ResetReason, SelfTest, SlotState, Status};
+use ballbar::wire::{Answer, BoardHello, Check, Command, ResetReason, SelfTest, SetIdentity, SlotState, Status};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -66,6 +66,8 @@ struct StatusReport {
     lvdt_faults: u32,
     stillness: &'static str,
     robot: Option<RobotLine>,
+    /// What was in use before, and can be brought back.
+    previous: Option<RobotLine>,
     staged_crc: Option<String>,
     slots: [String; 2],
     stack_unused_bytes: u32,
@@ -97,6 +99,25 @@ struct RobotLine {
     joints: u8,
     crc: String,
     sequence: u32,
+}
+
+impl From<&SetIdentity> for RobotLine {
+    fn from(set: &SetIdentity) -> Self {
+        Self {
+            name: set.name.as_str().to_owned(),
+            calibrated: set.is_calibrated,
+            joints: set.joints,
+            crc: format!("{:08x}", set.crc),
+            sequence: set.sequence,
+        }
+    }
+}
+
+impl RobotLine {
+    fn text(&self) -> String {
+        let what = if self.calibrated { "calibrated" } else { "not calibrated" };
+        format!("{} ({what}), {} joints, commit {}, CRC {}", one_line(&self.name), self.joints, self.sequence, self.crc)
+    }
 }
 
 #[derive(Serialize)]
@@ -184,13 +205,8 @@ impl StatusReport {
                 Stillness::Settling => "settling",
                 Stillness::Settled => "settled",
             },
-            robot: status.active.as_ref().map(|active| RobotLine {
-                name: active.name.as_str().to_owned(),
-                calibrated: active.is_calibrated,
-                joints: active.joints,
-                crc: hex(active.crc),
-                sequence: active.sequence,
-            }),
+            robot: status.active.as_ref().map(RobotLine::from),
+            previous: status.previous.as_ref().map(RobotLine::from),
             staged_crc: status.staged.map(hex),
             slots: status.slots.map(|slot| match slot {
                 SlotState::Empty => "empty".to_owned(),
@@ -243,16 +259,12 @@ impl Report for StatusReport {
             self.started_by
         );
         text += &match &self.robot {
-            Some(robot) => format!(
-                "robot {} ({}), {} joints, commit {}, CRC {}\n",
-                one_line(&robot.name),
-                if robot.calibrated { "calibrated" } else { "not calibrated" },
-                robot.joints,
-                robot.sequence,
-                robot.crc
-            ),
+            Some(robot) => format!("robot {}\n", robot.text()),
             None => "no parameters: host-cal apply PORT --robot calibrated.toml\n".into(),
         };
+        if let Some(previous) = &self.previous {
+            text += &format!("before it {}; back with host-cal apply PORT --previous\n", previous.text());
+        }
         text += &format!("flash: {}; {}\n", self.slots[0], self.slots[1]);
         text += &format!(
             "{} Hz, {} samples, {} overruns; {} stream messages, {} dropped; {}\n",

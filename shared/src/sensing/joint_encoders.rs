@@ -1,6 +1,7 @@
 //! Counts to joint values and back, with couplings between joints.
 
 use core::fmt;
+use core::ops::RangeInclusive;
 
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -43,12 +44,14 @@ pub struct JointEncoders<S> {
 pub enum EncoderError {
     /// More encoders or couplings than there may be.
     TooMany,
-    /// Counts per unit of this joint (from 0) are zero or no number.
+    /// Counts per unit of this joint (from 0) are no number, or of a size at which nobody can count: a count is more than a radian or
+    /// metre, or all of a counter's range is less.
     CountsPerUnit {
         /// The joint.
         joint: u8,
     },
-    /// A coupling of this joint (from 0) names no joint nearer to the base, or its ratio is no number.
+    /// A coupling of this joint (from 0) names no joint nearer to the base, or its ratio is no number or larger than 10,000 (a screw
+    /// of 5 mm a turn makes 1,257 radians of a metre).
     Coupling {
         /// The joint.
         joint: u8,
@@ -59,9 +62,12 @@ impl fmt::Display for EncoderError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooMany => write!(f, "more than {MAX_JOINTS} encoders or {MAX_COUPLINGS} couplings"),
-            Self::CountsPerUnit { joint } => write!(f, "joint {}: counts per unit are zero or not finite", joint + 1),
+            Self::CountsPerUnit { joint } => {
+                write!(f, "joint {}: counts per radian or metre must be 1 to 2^31 in size", joint.saturating_add(1))
+            }
             Self::Coupling { joint } => {
-                write!(f, "joint {}: a coupling must name a joint nearer to the base and a finite ratio", joint.saturating_add(1))
+                let joint = joint.saturating_add(1);
+                write!(f, "joint {joint}: a coupling must name a joint nearer to the base and a ratio of at most 10,000 in size")
             }
         }
     }
@@ -69,20 +75,27 @@ impl fmt::Display for EncoderError {
 
 impl core::error::Error for EncoderError {}
 
+/// Counts per radian or metre that make sense, in size.
+const COUNTS_PER_UNIT: RangeInclusive<f64> = 1.0..=2_147_483_648.0;
+/// The largest ratio of a coupling, in size.
+const MAX_RATIO: f64 = 1e4;
+
 impl<S: Real> JointEncoders<S> {
     /// The encoders of joints 1, 2, …, and what turns what along.
     ///
     /// # Errors
-    /// [`EncoderError`] for counts per unit or ratios that cannot be computed with, and couplings towards the tool.
+    /// [`EncoderError`] for counts per unit or ratios that no robot has, and couplings towards the tool.
     pub fn new(encoders: &[Encoder<S>], couplings: &[Coupling<S>]) -> Result<Self, EncoderError> {
         for (joint, encoder) in encoders.iter().enumerate() {
-            if !encoder.counts_per_unit.is_finite() || encoder.counts_per_unit == S::zero() {
+            let size = encoder.counts_per_unit.abs();
+            if !(size >= S::nearest(*COUNTS_PER_UNIT.start()) && size <= S::nearest(*COUNTS_PER_UNIT.end())) {
                 return Err(EncoderError::CountsPerUnit { joint: joint as u8 });
             }
         }
         for coupling in couplings {
             let is_joint = usize::from(coupling.joint) < encoders.len();
-            if !is_joint || coupling.driven_by >= coupling.joint || !coupling.ratio.is_finite() {
+            let is_plausible = coupling.ratio.abs() <= S::nearest(MAX_RATIO);
+            if !is_joint || coupling.driven_by >= coupling.joint || !is_plausible {
                 return Err(EncoderError::Coupling { joint: coupling.joint });
             }
         }
@@ -158,11 +171,13 @@ mod tests {
     fn encoders_that_cannot_be_computed_with_are_refused() {
         let good = Encoder { counts_per_unit: 1.0_f32, counts_per_index: 0 };
         let coupling = |joint, driven_by, ratio| Coupling { joint, driven_by, ratio };
-        for bad in [0.0, f32::NAN, f32::INFINITY] {
+        for bad in [0.0, -0.0, 1e-30, 0.99, -0.99, 2.2e9, 1e30, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY] {
             let encoder = Encoder { counts_per_unit: bad, ..good };
             assert_eq!(JointEncoders::new(&[good, encoder], &[]), Err(EncoderError::CountsPerUnit { joint: 1 }));
         }
-        for bad in [coupling(1, 1, 0.1), coupling(0, 1, 0.1), coupling(2, 0, 0.1), coupling(1, 0, f32::NAN)] {
+        for bad in
+            [coupling(1, 1, 0.1), coupling(0, 1, 0.1), coupling(2, 0, 0.1), coupling(1, 0, f32::NAN), coupling(1, 0, -1e30)]
+        {
             assert_eq!(JointEncoders::new(&[good, good], &[bad]), Err(EncoderError::Coupling { joint: bad.joint }));
         }
         assert_eq!(JointEncoders::new(&[good; 9], &[]), Err(EncoderError::TooMany));

@@ -51,10 +51,32 @@ impl fmt::Display for LvdtFault {
     }
 }
 
+/// No LVDT of a bar is longer than two metres.
+const MAX_DISPLACEMENT_M: f32 = 1.0;
+/// Nor is one shorter than a code of the longest.
+const MIN_TRAVEL_M: f32 = 1e-6;
+/// Steps in which a curve is looked at.
+const VALID_STEPS: u8 = 16;
+
 impl LvdtCurve {
-    /// Whether the curve can be used: finite coefficients and a range of codes that is not empty.
+    /// What a curve that is not valid lacks, in words.
+    pub const VALID: &str =
+        "the LVDT's curve must have a range of codes, rise or fall throughout it, and stay within a metre of mid travel";
+
+    /// Whether the curve is one of an LVDT: over a range of codes that is not empty the displacement rises throughout, or falls
+    /// throughout, by a micrometre at least, and stays within a metre of mid travel. Looked at in 16 steps.
     pub fn is_valid(&self) -> bool {
-        self.code_min < self.code_max && self.coefficients_m.iter().all(|c| c.is_finite())
+        if self.code_min >= self.code_max || !self.coefficients_m.iter().all(|c| c.is_finite()) {
+            return false;
+        }
+        let (first, last) = (f32::from(self.code_min), f32::from(self.code_max));
+        let at = |step: u8| {
+            let code = first + (last - first) * f32::from(step) / f32::from(VALID_STEPS);
+            self.displacement_of_code_m(code).unwrap_or(f32::NAN)
+        };
+        let travel_m = at(VALID_STEPS) - at(0);
+        let is_steady = |step: u8| (at(step + 1) - at(step)) * travel_m >= 0.0 && at(step).abs() <= MAX_DISPLACEMENT_M;
+        travel_m.abs() >= MIN_TRAVEL_M && at(VALID_STEPS).abs() <= MAX_DISPLACEMENT_M && (0..VALID_STEPS).all(is_steady)
     }
 
     /// Displacement from mid travel, metres, of one reading.

@@ -12,7 +12,7 @@ use crate::{LvdtCurve, MAX_JOINTS, Pose, SettledPose, StillnessCriteria};
 
 /// The protocol that this crate speaks.
 pub const PROTOCOL: ProtocolVersion = ProtocolVersion {
-    number: 1,
+    number: 2,
     schema: {
         let (to_board, to_host) =
             (Key::for_path::<ToBoard>("to-board").to_bytes(), Key::for_path::<ToHost>("to-host").to_bytes());
@@ -174,6 +174,8 @@ pub enum Command {
     },
     /// Resets the board, after the answer has left.
     Reset,
+    /// Reads the parameters that were in use before those that are: the other whole set in flash.
+    ReadPrevious,
 }
 
 /// Which parameters.
@@ -215,7 +217,7 @@ pub enum Answer {
     Status(Status),
     /// To `SelfTest`.
     SelfTest(SelfTest),
-    /// To `ReadParameters`.
+    /// To `ReadParameters` and `ReadPrevious`.
     Parameters(ParameterSet),
     /// To `WriteParameters` and `SetLvdt`: CRC-32 of what is staged now.
     Staged {
@@ -251,9 +253,9 @@ pub enum Refusal {
         /// Encoders or joints that there are.
         joints: u8,
     },
-    /// A value is no finite number.
+    /// A value is no finite number, or the pose is none.
     NotFinite,
-    /// The LVDT curve has no range of codes or no finite coefficients.
+    /// The LVDT's curve is none: see [`LvdtCurve::is_valid`].
     LvdtCurve,
     /// The parameters cannot be used.
     Parameters(ParameterSetError),
@@ -279,6 +281,8 @@ pub enum Refusal {
     Flash,
     /// No sample was taken yet.
     NoSample,
+    /// Flash holds no other parameters than those in use.
+    NoPrevious,
 }
 
 /// A stream message's frame of reference, and its content.

@@ -19,5 +19,5 @@ pub use messages::{
     Answer, BoardHello, Command, CurrentPose, Event, HostHello, LogMark, PROTOCOL, ProtocolVersion, Refusal, Reply, Request,
     ResetReason, Stream, StreamSelection, ToBoard, ToHost, ToolPose, WhichSet, hello_version,
 };
-pub use parameter_set::{CompiledParameters, ParameterSet, ParameterSetError, SetIdentity};
+pub use parameter_set::{CompiledParameters, MAX_REACH_M, MAX_SPAN_M, ParameterSet, ParameterSetError, SetIdentity};
 pub use status::{Check, CheckResult, EncoderStatus, LinkCounts, SelfTest, SlotState, Status};

@@ -1,15 +1,35 @@
 //! All that a board keeps in flash: the chain, its encoders, the LVDT.
 
+use core::f32::consts::PI;
 use core::fmt;
+use core::ops::RangeInclusive;
 
 use heapless::{String, Vec};
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use super::messages::ToolPose;
 use crate::{
-    Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, Kinematics, LvdtCurve, MAX_COUPLINGS, MAX_JOINTS,
-    MAX_PARAMETERS,
+    Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve, MAX_COUPLINGS,
+    MAX_JOINTS, MAX_PARAMETERS, Parameter, ParameterKind, ParameterUnit,
 };
+
+/// The farthest from the base that a tool may come, metres. At 100 m an f32 is 8 µm from the next, a tenth of what a ball-bar
+/// resolves; a link's length in millimetres that was taken for metres comes farther.
+pub const MAX_REACH_M: f32 = 100.0;
+/// The farthest from the tool that the origin of a frame may lie, metres. At 2 km an f32 is 0.12 mm from the next, and so are the
+/// poses: as much as a calibration leaves. Robots whose axes are nearly parallel do have lengths of half a kilometre that cancel.
+pub const MAX_SPAN_M: f32 = 2_000.0;
+/// The largest angle, radians: at 100 an f32 is 8 µrad from the next.
+const MAX_ANGLE_RAD: f32 = 100.0;
+/// Scales, in size.
+const SCALES: RangeInclusive<f32> = 1e-3..=1e3;
+/// Poses at which a set is judged. Each costs less than a forward kinematics (810 instructions): 52,000 at most, 0.3 ms of the board.
+const JUDGED_POSES: u32 = 64;
+/// Steps from pose to pose of each joint in turn, as parts of 2³² of its range: powers of 1/g, g⁹ = g + 1, whose multiples fill a
+/// space of eight joints evenly (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
+const STEPS: [u32; MAX_JOINTS] =
+    [3_958_238_938, 3_647_910_312, 3_361_911_662, 3_098_335_500, 2_855_423_889, 2_631_556_713, 2_425_240_877, 2_235_100_342];
 
 /// Parameters as they travel and as they stand in flash.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -70,19 +90,47 @@ pub enum ParameterSetError {
     },
     /// The encoders cannot be used.
     Encoders(EncoderError),
-    /// The LVDT curve has no range of codes or no finite coefficients.
+    /// The LVDT's curve is none: see [`LvdtCurve::is_valid`].
     Lvdt,
+    /// The angle or scale at this index is one that no robot has.
+    Implausible {
+        /// Position in parameter order, from 0.
+        index: u8,
+    },
+    /// At some of the poses that were looked at, the tool is farther from the base than any robot reaches, or nowhere.
+    Reach {
+        /// Position in parameter order, from 0, of the largest length.
+        longest: u8,
+    },
+    /// At some of the poses that were looked at, frames lie so far from the tool that single precision gives another robot's pose.
+    Precision {
+        /// Position in parameter order, from 0, of the largest length.
+        longest: u8,
+    },
 }
 
 impl fmt::Display for ParameterSetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parameter = |index: &u8| crate::Parameter::from_index(usize::from(*index));
         match self {
             Self::Sizes => f.write_str("numbers of joints, parameters and encoders do not fit together"),
-            Self::NotFinite { index } => {
-                write!(f, "{} is not a finite number", crate::Parameter::from_index(usize::from(*index)))
-            }
+            Self::NotFinite { index } => write!(f, "{} is not a finite number", parameter(index)),
             Self::Encoders(error) => error.fmt(f),
-            Self::Lvdt => f.write_str("the LVDT curve has no range of codes or no finite coefficients"),
+            Self::Lvdt => f.write_str(LvdtCurve::VALID),
+            Self::Implausible { index } => {
+                write!(f, "{} is out of range: an angle is 100 rad at most, a scale 0.001 to 1000 in size", parameter(index))
+            }
+            Self::Reach { longest } => write!(
+                f,
+                "the tool comes more than {MAX_REACH_M} m away from the base; the largest length is {}",
+                parameter(longest)
+            ),
+            Self::Precision { longest } => write!(
+                f,
+                "frames lie more than {} km from the tool, which single precision cannot compute with; the largest length is {}",
+                MAX_SPAN_M / 1e3,
+                parameter(longest)
+            ),
         }
     }
 }
@@ -101,11 +149,29 @@ impl ParameterSet {
         Chain::new(&self.kinds, &self.parameters).map_err(|_| ParameterSetError::Sizes)
     }
 
-    /// Checks everything, and makes the set ready to compute with.
+    /// The encoder outputs over which poses are looked at where nobody knows the joint limits, as on the board: a whole turn of
+    /// revolute joints and a metre either way of prismatic ones.
+    pub fn usual_ranges(&self) -> Vec<RangeInclusive<f32>, MAX_JOINTS> {
+        let range = |kind: &JointKind| match kind {
+            JointKind::Revolute => -PI..=PI,
+            JointKind::Prismatic => -1.0..=1.0,
+        };
+        self.kinds.iter().map(range).collect()
+    }
+
+    /// Checks everything, poses over the usual ranges too, and makes the set ready to compute with.
     ///
     /// # Errors
     /// [`ParameterSetError`] with the first thing that is wrong.
     pub fn compile(&self) -> Result<CompiledParameters, ParameterSetError> {
+        self.compile_within(&self.usual_ranges())
+    }
+
+    /// As [`ParameterSet::compile`], for ranges of the encoder outputs that are known, radians or metres.
+    ///
+    /// # Errors
+    /// As [`ParameterSet::compile`].
+    pub fn compile_within(&self, ranges: &[RangeInclusive<f32>]) -> Result<CompiledParameters, ParameterSetError> {
         let chain = self.chain()?;
         if self.encoders.len() != chain.joints() {
             return Err(ParameterSetError::Sizes);
@@ -114,6 +180,61 @@ impl ParameterSet {
         if !self.lvdt.is_valid() {
             return Err(ParameterSetError::Lvdt);
         }
-        Ok(CompiledParameters { joints: chain.joints(), kinematics: Kinematics::new(&chain), encoders, lvdt: self.lvdt })
+        let kinematics = Kinematics::new(&chain);
+        judge(&chain, &kinematics, ranges)?;
+        Ok(CompiledParameters { joints: chain.joints(), kinematics, encoders, lvdt: self.lvdt })
     }
+}
+
+impl CompiledParameters {
+    /// Pose of the tool at encoder outputs `q`; none where it is no finite number.
+    pub fn tool_pose(&self, q: &JointVector<f32>) -> Option<ToolPose> {
+        let pose = ToolPose::from(&self.kinematics.base_from_tool(q));
+        let numbers = pose.position_m.iter().chain(&pose.x_axis).chain(&pose.y_axis);
+        numbers.copied().all(f32::is_finite).then_some(pose)
+    }
+}
+
+/// Whether a chain of finite numbers is a robot's, seen by its poses over `ranges` of the encoder outputs and not by its lengths.
+fn judge(chain: &Chain<f32>, kinematics: &Kinematics<f32>, ranges: &[RangeInclusive<f32>]) -> Result<(), ParameterSetError> {
+    let is_plausible = |(index, value): (usize, &f32)| {
+        let parameter = Parameter::from_index(index);
+        match (parameter.kind(), chain.unit(parameter)) {
+            (ParameterKind::Scale, _) => SCALES.contains(&value.abs()),
+            (_, ParameterUnit::Radian) => value.abs() <= MAX_ANGLE_RAD,
+            _ => true,
+        }
+    };
+    if let Some(index) = chain.parameters().iter().enumerate().position(|parameter| !is_plausible(parameter)) {
+        return Err(ParameterSetError::Implausible { index: index as u8 });
+    }
+    for pose in 0..JUDGED_POSES {
+        let extent = kinematics.extent(&judged_pose(pose, ranges));
+        // Neither holds of what is not a number.
+        let (is_near, is_exact) = (extent.reach_m <= MAX_REACH_M, extent.span_m <= MAX_SPAN_M);
+        if !is_near {
+            return Err(ParameterSetError::Reach { longest: longest(chain) });
+        }
+        if !is_exact {
+            return Err(ParameterSetError::Precision { longest: longest(chain) });
+        }
+    }
+    Ok(())
+}
+
+/// The first is the middle of all ranges.
+fn judged_pose(pose: u32, ranges: &[RangeInclusive<f32>]) -> JointVector<f32> {
+    let mut q = JointVector::zero();
+    for ((value, range), step) in q.as_array_mut().iter_mut().zip(ranges).zip(STEPS) {
+        let part = pose.wrapping_mul(step) as i32 as f32 / 2_147_483_648.0;
+        let (middle, half) = ((range.end() + range.start()) / 2.0, (range.end() - range.start()) / 2.0);
+        *value = middle + part * half;
+    }
+    q
+}
+
+fn longest(chain: &Chain<f32>) -> u8 {
+    let lengths =
+        chain.parameters().iter().enumerate().filter(|&(i, _)| chain.unit(Parameter::from_index(i)) == ParameterUnit::Metre);
+    lengths.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs())).map_or(0, |(i, _)| i as u8)
 }

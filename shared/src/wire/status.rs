@@ -45,6 +45,8 @@ pub struct Status {
     pub slots: [SlotState; 2],
     /// Bytes of the stack that were never used.
     pub stack_unused_bytes: u32,
+    /// What was in use before, and still stands in flash; none where both places hold the same.
+    pub previous: Option<SetIdentity>,
 }
 
 /// Frames from the host, by their fate.
