@@ -22,7 +22,8 @@ use super::report::print;
 use super::stream::record_error;
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
-    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, check_board, remove_lag,
+    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, ProgramOptions, TrackOptions, check_board,
+    remove_lag,
 };
 use crate::files::PlanRow;
 use crate::plan::{Cell, Margins, Pace, check};
@@ -33,7 +34,7 @@ use crate::units::m_from_mm;
 use mover::{Mover, MoverArgs};
 use operator::{Hand, Terminal};
 use picture::Still;
-use programs::write_programs;
+use programs::Programs;
 use report::CollectReport;
 use session_files::SessionFiles;
 
@@ -42,6 +43,7 @@ use session_files::SessionFiles;
 #[command(after_help = "Examples:
   host-cal collect /dev/ttyUSB0 --session today --plan plan.csv --robot design.toml --rig rig.toml --robot-link manual
   host-cal collect /dev/ttyUSB0 --session today --robot-link sim --robot-address 127.0.0.1:7560
+  host-cal collect /dev/ttyUSB0 --session today --robot-link file --dialect fanuc --fanuc-j23 -1 --robot-tool 3
 
 A session that has begun needs no --plan, --robot and --rig: the same command goes on where it ended, after a crash or another day.
 At every change of the bar the command waits for Enter. Keys at any time (with Enter, where it shows lines and no steady screen):
@@ -161,13 +163,20 @@ impl CollectArgs {
         if self.continuous && !matches!(mover, Mover::Link(_)) {
             return Err(ArgumentError::ContinuousByHand.into());
         }
+        let programs = self.programs(&mover, &files, &options)?;
         let mut link = self.port.connect()?;
         let robot = RobotOnBoard::read(&mut link)?.ok_or(ArgumentError::NoParameters)?;
         if let Answer::Status(status) = link.request(Command::Status)? {
             check_board(&files.robot, &robot.0, robot.0.is_homed_by(&status))?;
         }
         files.write()?;
-        let guide = self.guide(&mover, &files, &options)?;
+        let guide = match programs {
+            None => Guide::Hand,
+            Some(programs) => {
+                programs.write(&self.session)?;
+                Guide::Programs(programs.names)
+            }
+        };
         let recorder = self.recorder(&link, &robot, &mover)?;
         let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let board = BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
@@ -223,11 +232,11 @@ impl CollectArgs {
         })
     }
 
-    /// What somebody is told who moves the robot.
-    fn guide(&self, mover: &Mover, files: &SessionFiles, options: &CollectOptions) -> Result<Guide, CommandError> {
-        let Mover::Programs(dialect) = mover else { return Ok(Guide::Hand) };
-        let programs = write_programs(&self.session, files, *dialect, options.speed, self.stand_s)?;
-        Ok(Guide::Programs(programs))
+    /// For a robot that a program of its controller moves.
+    fn programs(&self, mover: &Mover, files: &SessionFiles, options: &CollectOptions) -> Result<Option<Programs>, CommandError> {
+        let Mover::Programs(dialect) = mover else { return Ok(None) };
+        let options = ProgramOptions { speed: options.speed, stand_s: self.stand_s, setup: self.mover.setup() };
+        Ok(Some(Programs::of_plan(files, *dialect, &options)?))
     }
 
     fn hand(&self) -> Result<Hand, CommandError> {
