@@ -65,7 +65,7 @@ pub enum ProgramError {
     #[diagnostic(help("Give a speed above zero."))]
     Speed,
     /// Percentages are whole, and one is faster than what was asked for.
-    #[error("{dialect}: {asked:.3} {unit}/s is less than one percent of {full:.0} {unit}/s, the full speed that is assumed")]
+    #[error("{dialect}: {asked:.3} {unit}/s is less than one percent of {full:.0} {unit}/s, the full speed")]
     #[diagnostic(help(
         "Give a higher speed, or with --robot-fastest-deg-s what the robot's fastest joint reaches by its data sheet."
     ))]

@@ -131,7 +131,8 @@ pub struct ProgramFile {
 /// # Errors
 /// [`ProgramError`] when the language cannot hold it, or there is nothing to write.
 pub fn write_program(dialect: Dialect, program: &Program) -> Result<Vec<ProgramFile>, ProgramError> {
-    let (limits, write): (Limits, fn(&Program) -> Result<Vec<ProgramFile>, ProgramError>) = match dialect {
+    type Write = fn(&Program) -> Result<Vec<ProgramFile>, ProgramError>;
+    let (limits, write): (Limits, Write) = match dialect {
         Dialect::Val => (val::LIMITS, val::write),
         Dialect::UrScript => (urscript::LIMITS, urscript::write),
         Dialect::Krl => (krl::LIMITS, krl::write),
