@@ -80,10 +80,10 @@ fn popup(line: &str, name: &str, kind: &str, machine: &mut Machine) -> Result<()
 
 /// What is inside of the function is local to it.
 pub(super) fn global_names(files: &[ProgramFile]) -> Vec<String> {
-    let is_local = |line: &&str| !line.contains("global ");
+    let is_local = |line: &str| !line.contains("global ");
     let name = |file| {
         let (name, lines) = body(file).expect("a program");
-        assert!(lines.iter().all(|line| is_local(&line)));
+        assert!(lines.iter().all(|line| is_local(line)));
         name.to_owned()
     };
     files.iter().map(name).collect()
