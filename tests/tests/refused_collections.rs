@@ -130,6 +130,23 @@ fn a_collection_that_is_not_the_sessions_is_refused() {
 }
 
 #[test]
+fn programs_that_cannot_be_what_was_asked_for_are_refused_before_anything_else() {
+    let bench = bench_with_a_session();
+    let collect = ["collect", "port", "--session", "session", "--robot-link", "file"];
+    for (name, more) in [
+        ("collect_by_no_language", &[][..]),
+        ("collect_by_fanuc_without_its_j3", &["--dialect", "fanuc"]),
+        ("collect_by_fanuc_with_another_j3", &["--dialect", "fanuc", "--fanuc-j23", "-2"]),
+        ("collect_by_krl_with_a_tool_by_name", &["--dialect", "krl", "--robot-tool", "plate"]),
+        ("collect_by_val_with_a_tool", &["--dialect", "val", "--robot-tool", "1"]),
+        ("collect_by_percent_too_slowly", &["--dialect", "krl", "--speed-deg-s", "5"]),
+        ("collect_by_no_full_speed", &["--dialect", "krl", "--robot-fastest-deg-s", "0"]),
+    ] {
+        bench.refuses(name, &[&collect[..], more].concat());
+    }
+}
+
+#[test]
 fn a_board_that_cannot_be_collected_from_is_refused() {
     let mut geared = design();
     geared.encoders[2].encoder.as_mut().expect("a known encoder").counts_per_unit *= 2.0;

@@ -22,7 +22,8 @@ use super::report::print;
 use super::stream::{lock_error, record_error, say_recovered};
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
-    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, check_board, remove_lag,
+    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, ProgramOptions, TrackOptions, check_board,
+    remove_lag,
 };
 use crate::files::PlanRow;
 use crate::plan::{Cell, Margins, Pace, check};
@@ -33,7 +34,7 @@ use crate::units::m_from_mm;
 use mover::{Mover, MoverArgs};
 use operator::{Hand, Terminal};
 use picture::Still;
-use programs::write_programs;
+use programs::Programs;
 use report::CollectReport;
 use session_files::SessionFiles;
 
@@ -42,6 +43,7 @@ use session_files::SessionFiles;
 #[command(after_help = "Examples:
   host-cal collect /dev/ttyUSB0 --session today --plan plan.csv --robot design.toml --rig rig.toml --robot-link manual
   host-cal collect /dev/ttyUSB0 --session today --robot-link sim --robot-address 127.0.0.1:7560
+  host-cal collect /dev/ttyUSB0 --session today --robot-link file --dialect fanuc --fanuc-j23 -1 --robot-tool 3
 
 A session that has begun needs no --plan, --robot and --rig: the same command goes on where it ended, after a crash or another day.
 At every change of the bar the command waits for Enter. Keys at any time (with Enter, where it shows lines and no steady screen):
@@ -124,13 +126,6 @@ enum ArgumentError {
     NoParameters,
 }
 
-#[derive(Debug, Error, Diagnostic)]
-#[error("{}: cannot be made: {error}", folder.display())]
-struct FolderError {
-    folder: PathBuf,
-    error: std::io::Error,
-}
-
 /// Nothing is moved along a plan that leads into something, whoever wrote or edited it.
 fn check_plan(cell: &Cell<'_>, rows: &[PlanRow]) -> Result<(), ArgumentError> {
     /// Of a joint, radians or metres.
@@ -161,6 +156,7 @@ impl CollectArgs {
         if self.continuous && !matches!(mover, Mover::Link(_)) {
             return Err(ArgumentError::ContinuousByHand.into());
         }
+        let programs = self.programs(&mover, &files, &options)?;
         let mut link = self.port.connect()?;
         let robot = RobotOnBoard::read(&mut link)?.ok_or(ArgumentError::NoParameters)?;
         if let Answer::Status(status) = link.request(Command::Status)? {
@@ -168,7 +164,13 @@ impl CollectArgs {
         }
         let lock = SessionLock::acquire(&self.session).map_err(lock_error)?;
         files.write()?;
-        let guide = self.guide(&mover, &files, &options)?;
+        let guide = match programs {
+            None => Guide::Hand,
+            Some(programs) => {
+                programs.write(&self.session)?;
+                Guide::Programs(programs.names)
+            }
+        };
         let recorder = self.recorder(&lock, &link, &robot, &mover)?;
         let recovered = recorder.recovered();
         let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
@@ -232,11 +234,11 @@ impl CollectArgs {
         })
     }
 
-    /// What somebody is told who moves the robot.
-    fn guide(&self, mover: &Mover, files: &SessionFiles, options: &CollectOptions) -> Result<Guide, CommandError> {
-        let Mover::Programs(dialect) = mover else { return Ok(Guide::Hand) };
-        let programs = write_programs(&self.session, files, *dialect, options.speed, self.stand_s)?;
-        Ok(Guide::Programs(programs))
+    /// For a robot that a program of its controller moves.
+    fn programs(&self, mover: &Mover, files: &SessionFiles, options: &CollectOptions) -> Result<Option<Programs>, CommandError> {
+        let Mover::Programs(dialect) = mover else { return Ok(None) };
+        let options = ProgramOptions { speed: options.speed, stand_s: self.stand_s, setup: self.mover.setup() };
+        Ok(Some(Programs::of_plan(files, *dialect, &options)?))
     }
 
     fn hand(&self) -> Result<Hand, CommandError> {

@@ -43,8 +43,8 @@ impl Collector<'_, '_> {
             match programs {
                 None => self.tell_where(first)?,
                 Some(programs) => {
-                    // From the row before the shell its first row was found clear.
-                    if self.wait_near(shell.start.saturating_sub(1)..=shell.start)? {
+                    // Where the shell before ends: from there its first row was found clear, and there its program begins.
+                    if self.wait_near(shell.start.saturating_sub(1))? {
                         return Ok(Ended::Quit);
                     }
                     self.goal = Some(first);
@@ -85,14 +85,13 @@ impl Collector<'_, '_> {
         Ok(false)
     }
 
-    /// Waits until the arm is near one of some rows; says where to, if it is not. True when the operator wants to end.
-    fn wait_near(&mut self, rows: std::ops::RangeInclusive<usize>) -> Result<bool, CollectError> {
+    /// Waits until the arm is near a row; says where to, if it is not. True when the operator wants to end.
+    fn wait_near(&mut self, goal: usize) -> Result<bool, CollectError> {
         let kinds = self.cell.robot.chain.joint_kinds();
-        let goal = *rows.start();
         let mut is_told = false;
         loop {
             let q = self.board.view()?.q;
-            if rows.clone().any(|row| self.options.near.holds(kinds, &self.ledger.rows()[row].q, &q)) {
+            if self.options.near.holds(kinds, &self.ledger.rows()[goal].q, &q) {
                 return Ok(false);
             }
             if !is_told {

@@ -23,6 +23,7 @@ mod ledger;
 mod now;
 mod operator;
 mod repeat;
+mod shell_programs;
 mod track;
 
 pub use board_watch::{BoardWatch, Stand, View};
@@ -35,6 +36,7 @@ pub use ledger::{Ledger, RowState, shells};
 pub use now::{Goal, Now};
 pub use operator::{Event, Measured, Operator, Unattended, Wish};
 pub use repeat::Repeat;
+pub use shell_programs::{ProgramOptions, ShellProgram, plan_programs};
 pub use track::{MovingPose, TrackOptions};
 
 use ballbar::{JointKind, JointVector};

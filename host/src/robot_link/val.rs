@@ -327,7 +327,7 @@ impl Course {
             Stage::Point if is_question => Stage::Values,
             Stage::Values if is_question => Stage::Confirm,
             Stage::Point | Stage::Values => {
-                self.words.push("POINT does not ask CHANGE?".into());
+                self.words.push("POINT does not ask for changes".into());
                 self.conclude();
                 return;
             }

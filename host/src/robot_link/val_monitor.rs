@@ -1,12 +1,19 @@
 //! The monitor of VAL and VAL II as a terminal has it: a prompt, typed lines that are echoed, and what is printed below them.
 //!
 //! A reply begins with the echo of the line that was sent and ends with the prompt (`.`, or `*` while a program runs) or with the
-//! question `CHANGE?`. Whatever comes before the echo came by itself. The prompt `*` is also how messages begin (`*Envelope error*`):
+//! question for changes of a point. Whatever comes before the echo came by itself. The prompt `*` is also how messages begin (`*Envelope error*`):
 //! it counts only when nothing has followed for a moment.
 //!
-//! Sources: Unimation, "User's Guide to VAL" (398H2A, version 12, 1980), of which only parts were at hand, and V. Scheinman's drafts
-//! of it (saildart.org, UNI2.X). The dialogue of `POINT` and the layout of `WHERE` are from memory, and what messages look like is
-//! taken from VAL II's successor: Adept, "V+ Language Reference Guide", system messages.
+//! Known from sources: the two prompts and when commands may be typed ("User's Guide to VAL", 398H2A, version 12, 1980, as others
+//! quote it); that a point is printed, changed after the query `CHANGES?` by the values that are typed, and asked for again until
+//! nothing is typed (V. Scheinman, VAL of March 1977, saildart.org, UNI2.V, command TRANS); that VAL II's successor asks with a
+//! question mark, too, and takes `SPEED` and `DO MOVE` (public drivers of a Stäubli RX90); what messages look like (Adept, "V+
+//! Language Reference Guide", system messages). The spelling of the question differs between versions: `CHANGE?`, `CHANGES?` and
+//! `Change?` count alike.
+//!
+//! Not known from any source at hand: that `POINT` of a precision point goes through the dialogue of `TRANS`, that six values with
+//! commas are taken in one line, the layout of `WHERE`, and when the prompt comes after `DO`. These are from memory: try them by hand
+//! first.
 
 use std::time::{Duration, Instant};
 
@@ -49,7 +56,7 @@ pub(super) enum Heard {
     /// The reply to the latest line, echo and prompt taken off.
     Reply {
         lines: Vec<String>,
-        /// It ended with `CHANGE?` instead of the prompt.
+        /// It ended with the question for changes instead of the prompt.
         is_question: bool,
     },
     /// There was no reply in time.
@@ -187,12 +194,18 @@ impl Monitor {
 fn reply(held: &str, asked: &str) -> Option<(Vec<String>, bool)> {
     let (before, after) = if asked.is_empty() { ("", held) } else { held.split_once(asked)? };
     let (printed, last) = after.rsplit_once('\n')?;
-    let is_question = last.trim().starts_with("CHANGE?") || last.trim().is_empty() && printed.trim_end().ends_with("CHANGE?");
+    let is_question = asks_for_changes(last) || last.trim().is_empty() && asks_for_changes(printed);
     if is_question || [".", "*"].contains(&last.trim()) {
         Some((lines(before).into_iter().chain(lines(printed)).collect(), is_question))
     } else {
         None
     }
+}
+
+/// Whether a text ends with the question that versions spell `CHANGE?`, `CHANGES?` or `Change?`.
+fn asks_for_changes(text: &str) -> bool {
+    let upper = text.trim_end().to_ascii_uppercase();
+    ["CHANGE?", "CHANGES?"].iter().any(|question| upper.ends_with(question))
 }
 
 fn lines(text: &str) -> Vec<String> {
@@ -245,7 +258,10 @@ mod tests {
         assert_eq!(reply("\n.", "SPEED 25"), None, "a prompt of before");
         assert_eq!(reply("DO X\n*Unknown instruction*\n.", "DO X"), Some((vec!["*Unknown instruction*".into()], false)));
         assert_eq!(reply("POINT #B\n 0 0\nCHANGE?", "POINT #B"), Some((vec!["0 0".into()], true)));
-        assert!(reply("POINT #B\n 0 0\nCHANGE?\n", "POINT #B").unwrap().1);
+        for question in ["CHANGE?\n", "CHANGES?", "CHANGES?\n", "Change?", "Change? ", "change?\n"] {
+            assert!(reply(&format!("POINT #B\n 0 0\n{question}"), "POINT #B").unwrap().1, "{question}");
+        }
+        assert_eq!(reply("POINT #B\n 0 0\nWhy?", "POINT #B"), None);
         let (lines, _) = reply("\n*Envelope error* Jt 2\n.WHERE\n 1 2\n.", "WHERE").unwrap();
         assert_eq!(lines, ["*Envelope error* Jt 2", ".", "1 2"]);
     }

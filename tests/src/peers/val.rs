@@ -36,6 +36,8 @@ pub struct ValPeerOptions {
     pub prompts_at_end: bool,
     /// The prompt while a move is under way, `*` where `DO` counts as a program.
     pub prompts_busy: bool,
+    /// What it asks after a point, which versions spell differently.
+    pub question: &'static str,
 }
 
 impl Default for ValPeerOptions {
@@ -46,6 +48,7 @@ impl Default for ValPeerOptions {
             character: Duration::ZERO,
             prompts_at_end: false,
             prompts_busy: false,
+            question: "CHANGE?\r\n",
         }
     }
 }
@@ -267,7 +270,7 @@ impl Controller {
         let values = self.points.entry(name.to_owned()).or_insert([0.0; JOINTS]);
         let values: String = values.iter().map(|value| format!("{value:9.3}")).collect();
         self.question = Some(name.to_owned());
-        self.print(&format!("  X/JT1    Y/JT2    Z/JT3    O/JT4    A/JT5    T/JT6\r\n{values}\r\nCHANGE?\r\n"));
+        self.print(&format!("  X/JT1    Y/JT2    Z/JT3    O/JT4    A/JT5    T/JT6\r\n{values}\r\n{}", self.options.question));
     }
 
     /// Takes the answer to `CHANGE?`; an empty one leaves the point as it is.

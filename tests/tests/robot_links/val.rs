@@ -41,6 +41,15 @@ fn a_move_is_reached_whenever_the_prompt_comes() {
 }
 
 #[test]
+fn the_question_is_understood_however_it_is_spelt() {
+    for question in ["CHANGE?\r\n", "CHANGES?\r\n", "CHANGES?", "Change? "] {
+        let peer = ValPeer::start(ValPeerOptions { question, ..ValPeerOptions::default() });
+        assert_eq!(go(&mut open(&peer), &GOAL_DEG).unwrap(), MoveState::Reached, "{question}");
+        assert!(distance_rad(&peer, &GOAL_DEG) < RESOLUTION_RAD);
+    }
+}
+
+#[test]
 fn a_line_as_slow_as_the_real_one_is_understood() {
     let character = Duration::from_micros(1042);
     let peer = ValPeer::start(ValPeerOptions { character, ..ValPeerOptions::default() });

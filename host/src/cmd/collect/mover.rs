@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::cmd::outcome::CommandError;
 use crate::deadline::StopFlag;
-use crate::robot_link::program::Dialect;
+use crate::robot_link::program::{ControllerSetup, Dialect};
 use crate::robot_link::sim::SimLink;
 use crate::robot_link::urscript::{UrLink, UrPorts};
 use crate::robot_link::val::{VAL_BAUD, ValLink, ValSpeeds};
@@ -31,6 +31,17 @@ pub(super) struct MoverArgs {
     /// With file: the controller's language
     #[arg(long, value_enum)]
     dialect: Option<DialectArg>,
+    /// With file: the controller's tool whose load is the plate with its spheres; a number (krl, fanuc) [default: 1], or a name
+    /// (rapid) [default: tool0]
+    #[arg(long, value_name = "TOOL")]
+    robot_tool: Option<String>,
+    /// With file: what the robot's fastest revolute joint reaches by its data sheet, of which val, krl and fanuc take percentages
+    /// [default: 240, 600, 1000]
+    #[arg(long, value_name = "DEG/S", allow_hyphen_values = true)]
+    robot_fastest_deg_s: Option<f64>,
+    /// With file and fanuc: J3 at the pendant is joint 3 plus so many times joint 2: -1, 0 or 1 (docs/robots.md)
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(i8).range(-1..=1))]
+    fanuc_j23: Option<i8>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -103,6 +114,15 @@ impl MoverArgs {
             }
         };
         Ok(Mover::Link(link))
+    }
+
+    /// What programs have to know of the controller.
+    pub(super) fn setup(&self) -> ControllerSetup {
+        ControllerSetup {
+            tool: self.robot_tool.clone(),
+            fastest_rad_s: self.robot_fastest_deg_s.map(f64::to_radians),
+            j23: self.fanuc_j23,
+        }
     }
 
     /// The simulation's address, when it is the simulation that moves.

@@ -27,12 +27,25 @@ pub enum ProgramError {
     },
     /// A linear joint where the language has degrees.
     #[error("{dialect}: joint {joint} is prismatic, and the language has degrees there")]
-    #[diagnostic(help("Is it this robot's controller? Linear axes of most are external ones, after the sixth."))]
+    #[diagnostic(help(
+        "Is it this robot's controller? Linear axes of most are external ones: in front of the arm, or after its sixth."
+    ))]
     Prismatic {
         /// The language.
         dialect: Dialect,
         /// From 1.
         joint: usize,
+    },
+    /// More external axes than the language has.
+    #[error("{dialect}: the robot has {found} axes beside its arm, a program of this language {at_most} at most")]
+    #[diagnostic(help("Prismatic joints in front of the arm, and joints after its sixth, are external axes."))]
+    External {
+        /// The language.
+        dialect: Dialect,
+        /// The robot's.
+        found: usize,
+        /// The language's.
+        at_most: usize,
     },
     /// The name is none of the language.
     #[error("{dialect}: `{found}` cannot be a program's name")]
@@ -51,6 +64,53 @@ pub enum ProgramError {
     #[error("a speed is not above zero")]
     #[diagnostic(help("Give a speed above zero."))]
     Speed,
+    /// Percentages are whole, and one is faster than what was asked for.
+    #[error("{dialect}: {asked:.3} {unit}/s is less than one percent of {full:.0} {unit}/s, the full speed")]
+    #[diagnostic(help(
+        "Give a higher speed, or with --robot-fastest-deg-s what the robot's fastest joint reaches by its data sheet."
+    ))]
+    Slow {
+        /// The language.
+        dialect: Dialect,
+        /// Degrees or millimetres per second.
+        asked: f64,
+        /// Degrees or millimetres per second.
+        full: f64,
+        /// `deg` or `mm`.
+        unit: &'static str,
+    },
+    /// The tool is none of the language.
+    #[error("{dialect}: `{found}` is no tool, expected {expected}")]
+    #[diagnostic(help("It is the controller's tool whose load is the plate with its spheres."))]
+    Tool {
+        /// The language.
+        dialect: Dialect,
+        /// What was given.
+        found: String,
+        /// What a tool is in this language.
+        expected: &'static str,
+    },
+    /// How J3 is counted is not known.
+    #[error("fanuc: how the controller counts J3 is not said")]
+    #[diagnostic(help(
+        "Give --fanuc-j23 -1, 0 or 1. Jog J2 alone by +10 degrees, so that the pendant's J3 stays, and look at joint 3 of `host-cal pose`: \
+         it has turned by +10 degrees: -1; by -10: 1; it has not turned: 0."
+    ))]
+    J23Missing,
+    /// The arm has no J2 and J3 that turn.
+    #[error("fanuc: J3 + {found} · J2 of an arm whose second and third axis do not both turn")]
+    #[diagnostic(help("Leave --fanuc-j23 out, or give 0."))]
+    J23Needless {
+        /// What was given.
+        found: i8,
+    },
+    /// Not one of the three.
+    #[error("fanuc: J3 cannot be counted with {found} times J2")]
+    #[diagnostic(help("-1, 0 or 1."))]
+    J23Value {
+        /// What was given.
+        found: i8,
+    },
     /// The robot cannot stand for so long.
     #[error("the robot is to stand for {found_s} s, expected 0 to {at_most_s}")]
     #[diagnostic(help("A few seconds are enough for an arm to come to rest."))]

@@ -4,36 +4,58 @@
 //! lines in the joints, and blending would leave it. At measured steps the robot stands for a while. Values are those of the
 //! controller's joints, so robot.toml must have the controller's zeros and senses.
 //!
+//! A program moves only from where it begins. It tells the operator how the bar has to be and waits for the key that goes on; then
+//! it compares the joints with its first step, and ends with a message where one of them is off by more than
+//! [`START_TOLERANCE_DEG`] or [`START_TOLERANCE_MM`]. At its end it says what to do with the bar.
+//!
+//! The programs of a plan can all be in a controller at once: whatever has a name outside of its program has the program's name in it.
+//!
 //! | module | language | speed |
 //! | --- | --- | --- |
-//! | `val` | Unimation VAL II | percent, of an assumed full speed |
+//! | `val` | Unimation VAL II | percent of the fastest joint's |
 //! | `urscript` | Universal Robots | as asked |
-//! | `krl` | KUKA | percent, of an assumed full speed |
+//! | `krl` | KUKA | percent of the fastest joint's |
 //! | `rapid` | ABB | by the time of each move |
-//! | `fanuc` | Fanuc TP, as ASCII | by the time of each move |
+//! | `fanuc` | Fanuc TP, as ASCII | percent of the fastest joint's |
 
+mod axes;
 mod error;
 mod fanuc;
 mod krl;
+mod limits;
 mod rapid;
 mod urscript;
 mod val;
+mod words;
 
 use std::fmt;
 
 use ballbar::{JointKind, JointVector};
 
 use super::JointSpeed;
+use super::speed::percent;
 use crate::units::ScreenUnit;
+use axes::AxisValue;
+use limits::Limits;
+use words::printable;
 
 pub use error::ProgramError;
 
-/// The longest that a robot may be told to stand, seconds. Fanuc's `WAIT` ends at 327.67.
-const STAND_MAX_S: f64 = 300.0;
+/// A program moves when no revolute joint is farther from its first step, degrees: what somebody hits with the teach pendant, and
+/// what `collect` takes for the same place.
+pub const START_TOLERANCE_DEG: f64 = 0.5;
+/// The same of prismatic joints, millimetres.
+pub const START_TOLERANCE_MM: f64 = 1.0;
+/// What the operator is told otherwise.
+const NOT_AT_START: &str = "NOT AT THE FIRST POSE: nothing is moved";
 /// A move of a given time is faster in its middle than on average: half as much again in a cubic one, less in others.
 const PEAK_SPEED: f64 = 1.5;
 /// No move is given less time, seconds.
 const MOVE_MIN_S: f64 = 0.1;
+/// Nor is the first one, which is within the tolerance.
+const FIRST_MOVE_MIN_S: f64 = 2.0;
+/// Assumed full speed of an axis that slides, metres per second.
+const FULL_SPEED_M_S: f64 = 2.5;
 
 /// A controller's language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +96,25 @@ pub struct Program {
     pub speed: JointSpeed,
     /// How long the robot stands at a measured step, seconds.
     pub stand_s: f64,
+    /// What the operator sees to before the robot moves: whether the bar is on or off.
+    pub before: String,
+    /// What the operator is told at the end.
+    pub after: String,
+    /// Of the controller.
+    pub setup: ControllerSetup,
+}
+
+/// How a controller is set up, as far as its programs depend on it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ControllerSetup {
+    /// The controller's tool whose load is the plate with its spheres: a number (KRL, Fanuc) or a name (RAPID). Without one, tool 1
+    /// or `tool0`.
+    pub tool: Option<String>,
+    /// What the robot's fastest revolute joint reaches at 100 percent, radians per second (VAL, KRL, Fanuc). Without it, as much as
+    /// the fastest arms that the language drives.
+    pub fastest_rad_s: Option<f64>,
+    /// Fanuc: the controller's J3 is q3 + `j23` · q2; -1, 0 or 1.
+    pub j23: Option<i8>,
 }
 
 /// A file for the controller.
@@ -85,25 +126,13 @@ pub struct ProgramFile {
     pub text: String,
 }
 
-/// What a language can hold.
-struct Limits {
-    joints_min: usize,
-    joints_max: usize,
-    /// Whether a linear joint can be among the first six; and among the others.
-    robot_prismatic: bool,
-    external_prismatic: bool,
-    /// Characters of a name.
-    name_max: usize,
-    name_has_underscores: bool,
-    steps_max: usize,
-}
-
 /// Writes a program as the files of a language. Where there are several, all are needed, and the first is the one to run.
 ///
 /// # Errors
 /// [`ProgramError`] when the language cannot hold it, or there is nothing to write.
 pub fn write_program(dialect: Dialect, program: &Program) -> Result<Vec<ProgramFile>, ProgramError> {
-    let (limits, write): (Limits, fn(&Program) -> Vec<ProgramFile>) = match dialect {
+    type Write = fn(&Program) -> Result<Vec<ProgramFile>, ProgramError>;
+    let (limits, write): (Limits, Write) = match dialect {
         Dialect::Val => (val::LIMITS, val::write),
         Dialect::UrScript => (urscript::LIMITS, urscript::write),
         Dialect::Krl => (krl::LIMITS, krl::write),
@@ -111,7 +140,7 @@ pub fn write_program(dialect: Dialect, program: &Program) -> Result<Vec<ProgramF
         Dialect::FanucLs => (fanuc::LIMITS, fanuc::write),
     };
     limits.check(dialect, program)?;
-    Ok(write(program))
+    write(program)
 }
 
 impl Dialect {
@@ -136,49 +165,6 @@ impl fmt::Display for Dialect {
     }
 }
 
-impl Limits {
-    fn check(&self, dialect: Dialect, program: &Program) -> Result<(), ProgramError> {
-        let joints = program.kinds.len();
-        if !(self.joints_min..=self.joints_max).contains(&joints) {
-            let (at_least, at_most) = (self.joints_min, self.joints_max);
-            return Err(ProgramError::Joints { dialect, found: joints, at_least, at_most });
-        }
-        let holds = |joint: usize| if joint < 6 { self.robot_prismatic } else { self.external_prismatic };
-        let prismatic = |joint: &usize| program.kinds[*joint] == JointKind::Prismatic && !holds(*joint);
-        if let Some(joint) = (0..joints).find(prismatic) {
-            return Err(ProgramError::Prismatic { dialect, joint: joint + 1 });
-        }
-        let name = &program.name;
-        let is_letter = |c: char| c.is_ascii_alphanumeric() || (c == '_' && self.name_has_underscores);
-        let is_name =
-            name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(is_letter) && name.len() <= self.name_max;
-        if !is_name {
-            let underscores = if self.name_has_underscores { ", digits and underscores" } else { " and digits" };
-            return Err(ProgramError::Name { dialect, found: name.clone(), at_most: self.name_max, underscores });
-        }
-        let is_speed = |speed: f64| speed.is_finite() && speed > 0.0;
-        if !is_speed(program.speed.revolute_rad_s) || !is_speed(program.speed.prismatic_m_s) {
-            return Err(ProgramError::Speed);
-        }
-        if !(0.0..=STAND_MAX_S).contains(&program.stand_s) {
-            return Err(ProgramError::Stand { found_s: program.stand_s, at_most_s: STAND_MAX_S });
-        }
-        if program.steps.is_empty() {
-            return Err(ProgramError::NoSteps);
-        }
-        if program.steps.len() > self.steps_max {
-            return Err(ProgramError::Steps { dialect, found: program.steps.len(), at_most: self.steps_max });
-        }
-        for (number, step) in (1..).zip(&program.steps) {
-            // A million degrees or millimetres is more than any joint has, and room enough in every language's columns.
-            if let Some(joint) = program.values(step).iter().position(|value| value.is_nan() || value.abs() > 1e6) {
-                return Err(ProgramError::Value { step: number, joint: joint + 1 });
-            }
-        }
-        Ok(())
-    }
-}
-
 impl Program {
     /// A step's joint values, degrees or millimetres.
     fn values(&self, step: &ProgramStep) -> Vec<f64> {
@@ -199,21 +185,62 @@ impl Program {
         format!("ball-bar: {measured} poses measured, {} on the way", self.steps.len() - measured)
     }
 
-    /// Time for the move to a step at the program's speed, seconds, such that no joint is faster in its middle; `None` for the first,
-    /// whose way is not known.
-    fn move_s(&self, index: usize) -> Option<f64> {
-        let from = &self.steps.get(index.checked_sub(1)?)?.q;
-        let duration_s = self.speed.duration_s(&self.kinds, from, &self.steps[index].q);
+    /// A step's values by the controller's axes: the arm's, then the external ones.
+    fn axis_values(&self, step: &ProgramStep) -> Vec<AxisValue> {
+        let axes = axes::axes(&self.kinds);
+        let mut values: Vec<AxisValue> = axes
+            .into_iter()
+            .zip(&self.kinds)
+            .zip(self.values(step))
+            .map(|((axis, kind), value)| AxisValue { axis, kind: *kind, value })
+            .collect();
+        values.sort_by_key(|value| value.axis);
+        values
+    }
+
+    /// Time for the move to a step at the program's speed, seconds, such that no joint is faster in its middle. To the first step the
+    /// joints are off by the tolerance at most.
+    fn move_s(&self, index: usize) -> f64 {
+        let (duration_s, least_s) = match index.checked_sub(1) {
+            Some(before) => (self.speed.duration_s(&self.kinds, &self.steps[before].q, &self.steps[index].q), MOVE_MIN_S),
+            None => {
+                let alone_s = |kind: &JointKind| tolerance(*kind) / self.screen_speed(*kind);
+                (self.kinds.iter().map(alone_s).fold(0.0, f64::max), FIRST_MOVE_MIN_S)
+            }
+        };
         // Rounded up to hundredths.
-        Some(((PEAK_SPEED * duration_s).max(MOVE_MIN_S) * 100.0).ceil() / 100.0)
+        ((PEAK_SPEED * duration_s).max(least_s) * 100.0 - 1e-6).ceil() / 100.0
+    }
+
+    /// Degrees or millimetres per second.
+    fn screen_speed(&self, kind: JointKind) -> f64 {
+        let si = match kind {
+            JointKind::Revolute => self.speed.revolute_rad_s,
+            JointKind::Prismatic => self.speed.prismatic_m_s,
+        };
+        ScreenUnit::from(kind).from_si(si)
+    }
+
+    /// Whole percent of the full speed of joints of a kind, of which `assumed_deg_s` is that of the fastest revolute ones unless the
+    /// setup says what it is.
+    fn percent(&self, dialect: Dialect, kind: JointKind, assumed_deg_s: f64) -> Result<u8, ProgramError> {
+        let full = match kind {
+            JointKind::Revolute => self.setup.fastest_rad_s.map_or(assumed_deg_s, f64::to_degrees),
+            JointKind::Prismatic => ScreenUnit::Millimetre.from_si(FULL_SPEED_M_S),
+        };
+        let asked = self.screen_speed(kind);
+        // What degrees lose on their way through radians does not cost a percent.
+        if asked < 0.01 * full * (1.0 - 1e-9) {
+            return Err(ProgramError::Slow { dialect, asked, full, unit: ScreenUnit::from(kind).name() });
+        }
+        Ok(percent(asked, full))
     }
 }
 
-/// The text's printable ASCII without what ends a comment in one of the languages, at most `width` characters.
-fn printable(text: &str, width: usize) -> String {
-    let kept = |c: char| c.is_ascii_alphanumeric() || " .,:+-=()/#_".contains(c);
-    let text: String = text.chars().map(|c| if kept(c) { c } else { ' ' }).collect();
-    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    // ASCII, so that characters are bytes.
-    text[..text.len().min(width)].trim_end().to_owned()
+/// How far a joint of a kind may be from the first step, degrees or millimetres.
+fn tolerance(kind: JointKind) -> f64 {
+    match kind {
+        JointKind::Revolute => START_TOLERANCE_DEG,
+        JointKind::Prismatic => START_TOLERANCE_MM,
+    }
 }

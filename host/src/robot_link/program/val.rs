@@ -1,45 +1,61 @@
-//! Unimation VAL II: a program and its precision points in one file, as `LOAD` reads it.
+//! Unimation VAL II: a program without a location of its own, as `LOAD` reads it.
 //!
 //! `MOVE` is joint-interpolated, `BREAK` waits for its end, `FINE` for the servos to be within their narrow tolerance, `DELAY` stands.
-//! A precision point is `#` and a name, six joint angles in degrees. Speeds are percent; the full speed is assumed as the link does.
+//! Every program and every variable of VAL II is global, so goals stand in the instructions, `#PPOINT(…)`, six joint angles in
+//! degrees. The two variables that the program needs to look at the joints have its name in theirs.
 //!
-//! Sources: the layout of a program as VAL II's successor writes it, Adept, "V+ Language User's Guide", format of programs
-//! (`.PROGRAM name()`, `.END`, `;` for comments). The instructions and `.LOCATIONS` are from memory of VAL II and V+.
+//! Speeds are percent; the full speed is assumed as the link does.
+//!
+//! Sources: `docs/robots.md`, list of statements.
 
 use std::fmt::Write;
 
-use super::{Limits, Program, ProgramFile};
+use ballbar::JointKind;
+
+use super::words::{lines, minus};
+use super::{Dialect, Limits, NOT_AT_START, Program, ProgramError, ProgramFile, START_TOLERANCE_DEG};
 use crate::robot_link::val::ValSpeeds;
+use crate::units::fixed;
 
 pub(super) const LIMITS: Limits = Limits {
     joints_min: 1,
     joints_max: 6,
-    robot_prismatic: false,
-    external_prismatic: false,
-    // Of the older VAL; VAL II has more.
-    name_max: 6,
+    external_max: 0,
+    arm_prismatic: false,
+    // Six of the older VAL, less the letter before it in the names of variables.
+    name_max: 5,
     name_has_underscores: false,
-    // So that `P9999` stays within six characters with its sign.
     steps_max: 9_999,
 };
 /// Within the 80 columns of a terminal line.
-const COMMENT_MAX: usize = 60;
+const TEXT_MAX: usize = 60;
+const DECIMALS: usize = 3;
 
-pub(super) fn write(program: &Program) -> Vec<ProgramFile> {
+pub(super) fn write(program: &Program) -> Result<Vec<ProgramFile>, ProgramError> {
+    if let Some(found) = program.setup.tool.clone() {
+        return Err(ProgramError::Tool { dialect: Dialect::Val, found, expected: "none: VAL has no load" });
+    }
     let name = program.name.to_uppercase();
-    let percent = ValSpeeds::default().percent(program.speed.revolute_rad_s);
+    let full_deg_s = ValSpeeds::default().fastest_rad_s.to_degrees();
+    let percent = program.percent(Dialect::Val, JointKind::Revolute, full_deg_s)?;
     let mut text = format!(".PROGRAM {name}()\n; {}\n  SPEED {percent} ALWAYS\n  FINE ALWAYS\n", program.title());
-    let mut points = String::new();
+    let say = |words: &str| lines(words, TEXT_MAX).iter().map(|line| format!("  TYPE \"{line}\"\n")).collect::<String>();
+    text += &say(&format!("{name}: {}, then PROCEED", program.before));
+    text += &format!("  PAUSE\n  HERE #P{name}\n  DECOMPOSE Q{name}[1] = #P{name}\n");
+    // Writing to a String cannot fail.
+    for (number, value) in (1..).zip(program.values(&program.steps[0])) {
+        let off = minus(value, DECIMALS);
+        let _ = writeln!(text, "  IF ABS(Q{name}[{number}]{off}) > {START_TOLERANCE_DEG} GOTO 10");
+    }
     for (index, step) in program.steps.iter().enumerate() {
-        let number = index + 1;
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "; {}\n  MOVE #P{number}\n  BREAK", program.heading(index, COMMENT_MAX));
+        let values = program.values(step).iter().map(|value| fixed(*value, DECIMALS)).collect::<Vec<_>>().join(",");
+        let _ = writeln!(text, "; {}\n  MOVE #PPOINT({values})\n  BREAK", program.heading(index, TEXT_MAX));
         if step.is_measured {
             let _ = writeln!(text, "  DELAY {:.2}", program.stand_s);
         }
-        let values = program.values(step).iter().map(|value| format!("{value:.3}")).collect::<Vec<_>>().join(" ");
-        let _ = writeln!(points, "#P{number} {values}");
     }
-    text += &format!(".END\n.LOCATIONS\n{points}.END\n");
-    vec![ProgramFile { name: format!("{name}.LC"), text }]
+    text += &say(&format!("{name}: {}", program.after));
+    // A label takes the place of the line's first space.
+    text += &format!("  GOTO 20\n10{}20 STOP\n.END\n", &say(&format!("{name}: {NOT_AT_START}"))[1..]);
+    Ok(vec![ProgramFile { name: format!("{name}.PG"), text }])
 }
