@@ -5,6 +5,7 @@ mod workbench;
 
 use std::f64::consts::TAU;
 use std::fs;
+use std::sync::Mutex;
 
 use ballbar::{Chain, JointKind, JointVector, Kinematics, Measurement, ParameterUnit, Pose};
 use ballbar_tests::experiment::{Puma, dataset};
@@ -12,7 +13,9 @@ use ballbar_tests::solids::{NaiveCell, base_from_tool};
 use host_cal::files::{PlanRow, PoseRow, ROBOTS, Rig, Robot, RowKind};
 use host_cal::identify::{FitOptions, fit};
 use host_cal::kinematics::{InverseKinematics, Thoroughness};
-use host_cal::plan::{Cell, Expectation, Grid, Margins, Pace, Plan, PlanOptions, Quality, d_optimal, plan};
+use host_cal::plan::{
+    Cell, Expectation, Grid, Margins, Pace, Plan, PlanOptions, Progress, Quality, Stage, check, d_optimal, plan,
+};
 use host_cal::simulate::tool_error;
 use rand::seq::index::sample;
 use rand::{RngExt, SeedableRng};
@@ -204,6 +207,28 @@ fn the_same_seed_gives_the_same_plan_and_another_gives_another() {
     assert_ne!(first, rows(&options));
 }
 
+#[test]
+fn progress_names_its_stage_and_grows_to_the_end_of_each() {
+    let (robot, rig) = (Robot::open("puma560").unwrap(), Rig::open("triangles").unwrap());
+    let pairings = [("A", "1"), ("B", "2"), ("C", "3")];
+    for optimal in [None, Some(38)] {
+        let told = Mutex::new(Vec::<Progress>::new());
+        let tell = |now| told.lock().unwrap().push(now);
+        let options = PlanOptions { optimal, ..options(&rig, &pairings, &[0.46], 14) };
+        let rows = plan(&robot, &rig, &options, &tell).unwrap().rows;
+        let cell = Cell::new(&robot, &rig, options.travel_m, options.margins, options.pace).unwrap();
+        check(&cell, &rows, 0.1, 10, 0, &tell);
+        let told = told.into_inner().unwrap();
+        let stages: Vec<&[Progress]> = told.chunk_by(|a, b| a.stage == b.stage).collect();
+        assert_eq!(stages.iter().map(|stage| stage[0].stage).collect::<Vec<_>>(), Stage::ALL);
+        for stage in stages {
+            let (first, last) = (stage[0], stage[stage.len() - 1]);
+            assert_eq!((first.done, last.done), (0, first.total), "{first:?} {last:?}");
+            assert!(stage.windows(2).all(|pair| pair[1].total == first.total && pair[1].done >= pair[0].done), "{stage:?}");
+        }
+    }
+}
+
 /// Largest difference of a joint, whole turns apart counting as none.
 fn apart(chain: &Chain<f64>, a: &JointVector<f64>, b: &JointVector<f64>) -> f64 {
     let difference = |i: usize| {
@@ -340,16 +365,18 @@ fn noise_at_the_tool_is_what_was_expected() {
     assert!((found_mm / expected_mm - 1.0).abs() < 0.2, "{found_mm} {expected_mm}");
 }
 
-const PLAN: [&str; 10] = ["plan", "--robot", "puma560", "--rig", "triangles", "--bar", "460", "--per-pair", "5", "--pairings"];
+const PLAN: [&str; 7] = ["plan", "--robot", "puma560", "--rig", "triangles", "--bar", "460"];
+/// Tells all parameters.
+const ENOUGH: [&str; 4] = ["--per-pair", "15", "--pairings", "A:1,B:2,C:3"];
 
 #[test]
 fn a_plan_is_written_checked_and_told_as_json() {
     let bench = Workbench::new();
-    let run = bench.run(&[&PLAN[..], &["A:1,B:2", "--out", "plan.csv"]].concat());
+    let run = bench.run(&[&PLAN[..], &ENOUGH, &["--out", "plan.csv"]].concat());
     assert_eq!(run.code, 0, "{}", run.transcript());
     let written = fs::read_to_string(bench.path("plan.csv")).unwrap();
 
-    let json = bench.run(&[&PLAN[..], &["A:1,B:2", "--json"]].concat());
+    let json = bench.run(&[&PLAN[..], &ENOUGH, &["--json"]].concat());
     let rows = json.json()["rows"].as_array().unwrap().clone();
     assert_eq!((json.code, rows.len()), (0, written.lines().count() - 1));
     for (row, line) in rows.iter().zip(written.lines().skip(1)) {
@@ -357,8 +384,8 @@ fn a_plan_is_written_checked_and_told_as_json() {
         assert_eq!((row["kind"].as_str(), row["chuck"].as_str()), (Some(fields[0]), Some(fields[1])));
         assert!((row["q"][5].as_f64().unwrap() - fields[9].parse::<f64>().unwrap()).abs() < 1e-8);
     }
-    let summary = bench.run(&[&PLAN[..], &["A:1,B:2", "--out", "plan.csv", "--json"]].concat()).json();
-    assert!(summary.get("rows").is_none() && summary["out"] == "plan.csv" && summary["poses"] == 10);
+    let summary = bench.run(&[&PLAN[..], &ENOUGH, &["--out", "plan.csv", "--json"]].concat()).json();
+    assert!(summary.get("rows").is_none() && summary["out"] == "plan.csv" && summary["poses"] == 45);
 
     let check = ["plan", "--robot", "puma560", "--rig", "triangles", "--check"];
     let whole = bench.run(&[&check[..], &["plan.csv", "--json"]].concat());
@@ -380,6 +407,29 @@ fn a_d_optimal_plan_is_shown_beside_the_grid() {
     assert!(of("chosen", "log10_determinant") > of("grid_of_same_size", "log10_determinant") + 1.0, "{optimal}");
     for what in ["condition", "smallest_singular_mm", "noise_amplification_index_mm", "amplification"] {
         assert!(of("chosen", what) > 0.0 && of("grid_of_same_size", what) > 0.0);
+    }
+}
+
+#[test]
+fn a_plan_that_no_fit_could_use_says_so() {
+    let bench = Workbench::new();
+    let plan = |more: &[&str]| bench.run(&[&PLAN[..], more, &["--out", "plan.csv", "--json"]].concat());
+    let cases: [(&[&str], &str); 4] = [
+        (&["--pairings", "A:1,B:2,C:3", "--per-pair", "14", "--latitudes-deg", "20,70"], "noise of the lengths reaches the tool"),
+        (&["--per-pair", "3", "--latitudes-deg", "45"], "27 poses for 36 parameters"),
+        (&["--per-pair", "4", "--latitudes-deg", "30,60"], "36 poses for 36 parameters"),
+        (&["--pairings", "A:1,A:2", "--per-pair", "20"], "identify 32 of 36 parameters"),
+    ];
+    for (more, why) in cases {
+        let run = plan(more);
+        assert_eq!(run.code, 1, "{}", run.transcript());
+        assert!(run.stderr.contains(why), "{}", run.stderr);
+        assert!(run.json()["warnings"][0].as_str().is_some_and(|said| said.contains(why)), "{}", run.transcript());
+        assert!(bench.path("plan.csv").exists());
+        if why.contains("identify") {
+            // A figure that leaves the errors of some parameters out is none.
+            assert!(run.json()["quality"]["amplification"].is_null() && run.stderr.contains("one chuck"), "{}", run.transcript());
+        }
     }
 }
 
@@ -420,8 +470,9 @@ fn what_cannot_be_planned_is_refused() {
 #[test]
 fn a_plan_that_is_not_of_this_robot_or_is_damaged_is_refused() {
     let bench = Workbench::new();
-    let run = bench.run(&[&PLAN[..], &["A:1", "--out", "plan.csv"]].concat());
-    assert_eq!(run.code, 0, "{}", run.transcript());
+    // Too few poses for a fit, but a plan.
+    let run = bench.run(&[&PLAN[..], &["--per-pair", "5", "--pairings", "A:1", "--out", "plan.csv"]].concat());
+    assert_eq!(run.code, 1, "{}", run.transcript());
     let text = fs::read_to_string(bench.path("plan.csv")).unwrap();
     bench.put("kind.csv", text.replacen("\nvia,", "\npass,", 1));
     bench.put("chuck.csv", text.replacen("\nmeasure,A,", "\nmeasure,Q,", 1));

@@ -130,7 +130,7 @@ enum ArgumentError {
 fn check_plan(cell: &Cell<'_>, rows: &[PlanRow]) -> Result<(), ArgumentError> {
     /// Of a joint, radians or metres.
     const STEP: f64 = 0.02;
-    let found = check(cell, rows, STEP, 0, 0);
+    let found = check(cell, rows, STEP, 0, 0, &|_| ());
     let what = if found.limit_rad < 0.0 || found.limit_m < 0.0 {
         "a joint beyond its limits".to_owned()
     } else if found.travel_m < 0.0 {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use indicatif::ProgressBar;
 
 use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
@@ -11,7 +12,7 @@ use super::plan_margins::{CheckReport, Least};
 use super::plan_report::PlanReport;
 use super::report::{print, progress, warn, write_file};
 use crate::files::{FileKind, Output, PlanRow, Rig, Robot, Source, read_plan, write_plan};
-use crate::plan::{Cell, CheckFound, Grid, Margins, Pace, PlanOptions, check, plan};
+use crate::plan::{Cell, CheckFound, Grid, Margins, Pace, PlanOptions, Progress, Stage, check, plan};
 use crate::units::{m_from_mm, mm_from_m};
 
 /// Plan poses on hemispherical shells, and collision-free ways between them
@@ -129,8 +130,8 @@ impl PlanArgs {
             self.output_to(path).check().map_err(CommandError::not_written)?;
         }
         let start = Instant::now();
-        let bar = progress(options.ticks() as u64, "planning poses and ways");
-        let plan = plan(robot, rig, &options, &|count| bar.inc(count as u64));
+        let bar = progress(1, "planning");
+        let plan = plan(robot, rig, &options, &|now| show(&bar, now));
         bar.finish_and_clear();
         let plan = plan?;
         let planning_s = start.elapsed().as_secs_f64();
@@ -180,7 +181,10 @@ impl PlanArgs {
         const STEP: f64 = 0.01;
         const ROBOTS: usize = 1000;
         let cell = Cell::new(robot, rig, travel_m, margins, pace)?;
-        Ok(check(&cell, rows, STEP, ROBOTS, self.seed.wrapping_add(1)))
+        let bar = progress(1, "checking");
+        let found = check(&cell, rows, STEP, ROBOTS, self.seed.wrapping_add(1), &|now| show(&bar, now));
+        bar.finish_and_clear();
+        Ok(found)
     }
 
     fn bars_m(&self, rig: &Rig) -> Result<Vec<f64>, CommandError> {
@@ -232,6 +236,16 @@ impl PaceArgs {
             settle_s: self.settle_s,
         })
     }
+}
+
+/// A bar for each stage, with the stage's number and name.
+fn show(bar: &ProgressBar, now: Progress) {
+    if now.done == 0 {
+        bar.set_length(now.total as u64);
+        bar.set_message(format!("{}/{} {}", now.stage as usize + 1, Stage::ALL.len(), now.stage));
+        bar.reset();
+    }
+    bar.set_position(now.done as u64);
 }
 
 fn no_repeats(flag: &'static str, numbers: &[f64]) -> Result<(), ListError> {

@@ -8,7 +8,8 @@ use super::plan_margins::{Least, MarginLine};
 use super::report::Report;
 use super::table::{Columns, fixed};
 use crate::files::{PlanRow, Rig, Robot, RowKind, RowMargins};
-use crate::plan::{CheckFound, Comparison, Plan, PlanOptions, Quality, ShellSummary};
+use crate::identify::remarks;
+use crate::plan::{CheckFound, Comparison, Plan, PlanOptions, Quality, ShellSummary, Unfit};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 
@@ -98,7 +99,8 @@ struct QualityLine {
     condition: f64,
     smallest_singular_mm: f64,
     noise_amplification_index_mm: f64,
-    amplification: f64,
+    /// `None` where some parameters are not told: their errors would be missing in it.
+    amplification: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -109,8 +111,8 @@ struct ComparisonLine {
     grid: Option<QualityLine>,
 }
 
-impl From<&Quality> for QualityLine {
-    fn from(quality: &Quality) -> Self {
+impl QualityLine {
+    fn new(quality: &Quality, independent: usize) -> Self {
         let Quality {
             poses,
             parameters,
@@ -129,18 +131,19 @@ impl From<&Quality> for QualityLine {
             condition,
             smallest_singular_mm,
             noise_amplification_index_mm,
-            amplification,
+            amplification: (parameters >= independent).then_some(amplification),
         }
     }
 }
 
-impl From<&Comparison> for ComparisonLine {
-    fn from(comparison: &Comparison) -> Self {
+impl ComparisonLine {
+    fn new(comparison: &Comparison, independent: usize) -> Self {
+        let line = |quality: &Quality| QualityLine::new(quality, independent);
         Self {
             pool: comparison.pool,
-            chosen: (&comparison.chosen).into(),
-            grid_of_same_size: comparison.grid_of_same_size.as_ref().map(QualityLine::from),
-            grid: comparison.grid.as_ref().map(QualityLine::from),
+            chosen: line(&comparison.chosen),
+            grid_of_same_size: comparison.grid_of_same_size.as_ref().map(line),
+            grid: comparison.grid.as_ref().map(line),
         }
     }
 }
@@ -238,12 +241,12 @@ impl PlanReport {
             parameters: robot.chain.parameter_count(),
             independent_expected: plan.expectation.independent,
             condition: plan.expectation.condition,
-            quality: plan.quality.as_ref().map(QualityLine::from),
-            optimal: plan.comparison.as_ref().map(ComparisonLine::from),
+            quality: plan.quality.as_ref().map(|quality| QualityLine::new(quality, plan.expectation.independent)),
+            optimal: plan.comparison.as_ref().map(|comparison| ComparisonLine::new(comparison, plan.expectation.independent)),
             planning_s,
             seed: options.seed,
             out: out.map(|path| path.display().to_string()),
-            warnings: warnings(rig, plan, &least, &margins),
+            warnings: warnings(robot, rig, plan, &least, &margins),
             margins,
             least,
             rows: match out {
@@ -254,8 +257,8 @@ impl PlanReport {
     }
 }
 
-fn warnings(rig: &Rig, plan: &Plan, least: &Least, margins: &MarginLine) -> Vec<String> {
-    let mut warnings = Vec::new();
+fn warnings(robot: &Robot, rig: &Rig, plan: &Plan, least: &Least, margins: &MarginLine) -> Vec<String> {
+    let mut warnings = why_unfit(robot, rig, plan);
     let blocked = plan.shells.iter().filter(|shell| !shell.is_approach_clear);
     warnings.extend(blocked.map(|shell| {
         format!(
@@ -264,10 +267,35 @@ fn warnings(rig: &Rig, plan: &Plan, least: &Least, margins: &MarginLine) -> Vec<
             tidy(mm_from_m(shell.bar_m))
         )
     }));
-    if warnings.is_empty() && !least.is_kept(margins) {
+    let all_clear = plan.shells.iter().all(|shell| shell.is_approach_clear);
+    if all_clear && !least.is_kept(margins) {
         warnings.push("fine steps along the plan show less than the margins asked for; see the table".to_owned());
     }
     warnings
+}
+
+/// Why a fit to the plan's poses could not be trusted, and what to plan instead.
+fn why_unfit(robot: &Robot, rig: &Rig, plan: &Plan) -> Vec<String> {
+    const MORE: &str = "ask for more poses with --per-pair, --bar or --pairings";
+    let Some(unfit) = plan.unfit else { return Vec::new() };
+    let mut why = vec![match unfit {
+        Unfit::FewPoses { poses, parameters } => format!(
+            "{poses} poses for {parameters} parameters: a fit would take noise for parameters, expected three times as many poses; {MORE}"
+        ),
+        Unfit::Rank { rank, parameters } => {
+            format!("these poses identify {rank} of {parameters} parameters: a fit would leave the others at their design values")
+        }
+        Unfit::Noise { amplification, tool_m, design_m } => format!(
+            "noise of the lengths reaches the tool {amplification:.0} times as large, {:.1} mm by usual noise; that is more than a design \
+             is plausibly off, {:.1} mm, and a fit would do harm; {MORE}",
+            mm_from_m(tool_m),
+            mm_from_m(design_m)
+        ),
+    }];
+    if !matches!(unfit, Unfit::Noise { .. }) {
+        why.extend(remarks(&robot.chain, &plan.as_dataset(rig), rig, &robot.limits));
+    }
+    why
 }
 
 impl Report for PlanReport {
@@ -338,7 +366,7 @@ impl PlanReport {
                 fixed(quality.condition, 0),
                 fixed(quality.smallest_singular_mm, 3),
                 fixed(quality.noise_amplification_index_mm, 5),
-                format!("{} x", fixed(quality.amplification, 3)),
+                quality.amplification.map_or_else(|| "-".to_owned(), |times| format!("{} x", fixed(times, 3))),
             ]);
         }
         let choice = self.optimal.as_ref().map(|optimal| format!(", chosen from {}", optimal.pool)).unwrap_or_default();

@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cell::Cell;
 use super::contact::Contact;
+use super::progress::{Ongoing, Stage, Tell};
 use crate::files::{PlanRow, RowKind};
 
 /// Least margins over all rows and fine steps between them.
@@ -36,7 +37,8 @@ pub struct Found {
 /// Looks at a plan in steps of a joint of at most `step`, radians or metres, and with so many plausible robots.
 ///
 /// The bar counts as attached between rows of one pairing and bar that both have a length.
-pub fn check(cell: &Cell<'_>, rows: &[PlanRow], step: f64, plausible_robots: usize, seed: u64) -> Found {
+pub fn check(cell: &Cell<'_>, rows: &[PlanRow], step: f64, plausible_robots: usize, seed: u64, tell: &Tell<'_>) -> Found {
+    let progress = Ongoing::begin(Stage::Check, rows.len() + plausible_robots, tell);
     let mut found = Found {
         steps: 0,
         limit_rad: f64::INFINITY,
@@ -60,6 +62,7 @@ pub fn check(cell: &Cell<'_>, rows: &[PlanRow], step: f64, plausible_robots: usi
         if row.kind == RowKind::Measure {
             found.singularity = found.singularity.min(cell.singularity(&cell.posture(&row.q)));
         }
+        progress.tick(1);
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for _ in 0..plausible_robots {
@@ -68,6 +71,7 @@ pub fn check(cell: &Cell<'_>, rows: &[PlanRow], step: f64, plausible_robots: usi
             let length_m = kinematics.length(&row.q, &cell.rig.pairing(row.pairing));
             found.plausible_travel_m = found.plausible_travel_m.min(cell.travel_m / 2.0 - (length_m - row.bar_m).abs());
         }
+        progress.tick(1);
     }
     found
 }

@@ -6,13 +6,14 @@ use super::cell::Cell;
 use super::cores::on_all_cores;
 use super::experience::NOISE_M;
 use super::information::information;
+use super::progress::{Ongoing, Stage, Tell};
 use super::shell::ShellRoads;
 use super::transfer;
 
 /// Without the families that the arm cannot come to from most others even with the bar off, where a shell has another: they lie in
 /// pockets that it cannot have come into.
-pub(super) fn in_one_piece(cell: &Cell<'_>, all: Vec<Vec<ShellRoads>>, seed: u64) -> Vec<Vec<ShellRoads>> {
-    let pieces = pieces(cell, &all, seed);
+pub(super) fn in_one_piece(cell: &Cell<'_>, all: Vec<Vec<ShellRoads>>, seed: u64, tell: &Tell<'_>) -> Vec<Vec<ShellRoads>> {
+    let pieces = pieces(cell, &all, seed, tell);
     let count = |piece: usize| pieces.iter().flatten().filter(|other| **other == Some(piece)).count();
     let last = pieces.iter().flatten().flatten().max().copied();
     let Some(largest) = last.and_then(|last| (0..=last).rev().max_by_key(|&piece| count(piece))) else { return all };
@@ -26,15 +27,18 @@ pub(super) fn in_one_piece(cell: &Cell<'_>, all: Vec<Vec<ShellRoads>>, seed: u64
 
 /// Of each shell's families the number of the piece that it lies in, pieces counted from 0; `None` for one without postures. A family
 /// lies in the first piece to whose first family a way was found.
-fn pieces(cell: &Cell<'_>, all: &[Vec<ShellRoads>], seed: u64) -> Vec<Vec<Option<usize>>> {
+fn pieces(cell: &Cell<'_>, all: &[Vec<ShellRoads>], seed: u64, tell: &Tell<'_>) -> Vec<Vec<Option<usize>>> {
     let mut of: Vec<Vec<Option<usize>>> = all.iter().map(|families| vec![None; families.len()]).collect();
     let places = all.iter().enumerate().flat_map(|(shell, families)| (0..families.len()).map(move |family| (shell, family)));
     let first = |(shell, family): (usize, usize)| all[shell][family].nodes.first().map(|node| &node.q);
     let mut left: Vec<(usize, usize)> = places.filter(|&place| first(place).is_some()).collect();
+    let progress = Ongoing::begin(Stage::Families, left.len(), tell);
     for piece in 0.. {
         let Some(from) = left.first().and_then(|&place| first(place)) else { break };
         let is_joined = on_all_cores(left.len(), |i| {
-            i == 0 || first(left[i]).is_some_and(|to| transfer::free(cell, from, to, seed).is_some())
+            let is_joined = i == 0 || first(left[i]).is_some_and(|to| transfer::free(cell, from, to, seed).is_some());
+            progress.tick(usize::from(is_joined));
+            is_joined
         });
         for ((shell, family), _) in left.iter().zip(&is_joined).filter(|(_, is_joined)| **is_joined) {
             of[*shell][*family] = Some(piece);

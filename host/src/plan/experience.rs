@@ -9,7 +9,7 @@ pub(super) struct Experience {
     covariance: DMatrix<f64>,
 }
 
-/// Noise of a length, metres: of the paper's order (0.084 mm). Only its ratio to plausible deviations matters here.
+/// Usual noise of a length, metres: of the paper's order (0.084 mm). Only its ratio to plausible deviations matters.
 pub(super) const NOISE_M: f64 = 1e-4;
 
 impl Experience {

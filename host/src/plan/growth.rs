@@ -10,6 +10,7 @@ use super::cell::Cell;
 use super::experience::Experience;
 use super::grid::{Crossing, Grid};
 use super::posture::{Shell, find};
+use super::progress::Part;
 use super::shell::{Node, ShellRoads};
 use super::way;
 
@@ -40,17 +41,16 @@ pub(super) struct Wanted {
 /// Families of postures on a shell, the largest first. Ways join those of a family with one another; none was found from family to
 /// family.
 ///
-/// Where part of the grid is not reached, longitudes between the others make up for it. `tick` is called with numbers that add up to
-/// [`FAMILIES`] times the crossings wanted.
+/// Where part of the grid is not reached, longitudes between the others make up for it. `progress` is told of every crossing.
 pub(super) fn families(
     cell: &Cell<'_>,
     shell: Shell,
     grid: &Grid,
     wanted: Wanted,
     rng: &mut ChaCha8Rng,
-    tick: &dyn Fn(usize),
+    progress: &Part<'_>,
 ) -> Vec<ShellRoads> {
-    let mut first = Growth::new(cell, shell, wanted, tick);
+    let mut first = Growth::new(cell, shell, wanted, progress);
     first.grow_all(grid, rng);
     let least = (SHARE_OF_FIRST * first.reached() as f64).ceil() as usize;
     let mut grown = vec![first];
@@ -59,7 +59,7 @@ pub(super) fn families(
         if grown.len() == FAMILIES || grown.iter().any(is_known) {
             continue;
         }
-        let mut growth = Growth::new(cell, shell, wanted, tick);
+        let mut growth = Growth::new(cell, shell, wanted, progress);
         growth.begin(start);
         growth.grow_all(grid, rng);
         if growth.reached() >= least {
@@ -69,8 +69,6 @@ pub(super) fn families(
     for growth in &mut grown {
         growth.fill(grid, wanted, rng);
     }
-    let ticked: usize = grown.iter().map(|growth| growth.ticked).sum();
-    tick((FAMILIES * wanted.crossings).saturating_sub(ticked));
     grown.into_iter().map(Growth::harvest).collect()
 }
 
@@ -85,12 +83,11 @@ struct Growth<'a, 'c> {
     /// Of each crossing the postures that are not nodes.
     choices: Vec<Vec<Node>>,
     most: usize,
-    ticked: usize,
-    tick: &'a dyn Fn(usize),
+    progress: &'a Part<'a>,
 }
 
 impl<'a, 'c> Growth<'a, 'c> {
-    fn new(cell: &'a Cell<'c>, shell: Shell, wanted: Wanted, tick: &'a dyn Fn(usize)) -> Self {
+    fn new(cell: &'a Cell<'c>, shell: Shell, wanted: Wanted, progress: &'a Part<'a>) -> Self {
         Self {
             cell,
             roads: ShellRoads {
@@ -105,8 +102,7 @@ impl<'a, 'c> Growth<'a, 'c> {
             experience: Experience::new(cell.robot.chain.parameter_count()),
             choices: Vec::new(),
             most: wanted.crossings,
-            ticked: 0,
-            tick,
+            progress,
         }
     }
 
@@ -184,6 +180,7 @@ impl<'a, 'c> Growth<'a, 'c> {
 
     /// Takes a crossing in, with the posture that tells most of those that can be joined.
     fn grow(&mut self, crossing: Crossing, rng: &mut ChaCha8Rng) {
+        self.progress.tick();
         let index = self.roads.crossings.len();
         self.roads.crossings.push(crossing);
         let found = find(self.cell, &self.roads.shell, &crossing, POSTURES, rng);
@@ -275,10 +272,6 @@ impl<'a, 'c> Growth<'a, 'c> {
     }
 
     fn push(&mut self, node: Node, joined: Option<(usize, Vec<JointVector<f64>>)>) {
-        if self.ticked < self.most && self.roads.nodes.iter().all(|other| other.crossing != node.crossing) {
-            self.ticked += 1;
-            (self.tick)(1);
-        }
         let index = self.roads.nodes.len();
         self.roads.nodes.push(node);
         match joined {

@@ -15,11 +15,12 @@ use super::grid::Grid;
 use super::growth::{FAMILIES, Wanted, families};
 use super::optimal::d_optimal;
 use super::posture::{Hindrance, Shell};
-use super::quality::{Expectation, Quality};
+use super::progress::{Ongoing, Stage, Tell};
+use super::quality::{Expectation, Quality, Unfit};
 use super::scene::FixturesOverlap;
-use super::shell::{ShellRoads, Stop};
+use super::shell::{ShellRoads, Stop, TOURS};
 use super::transfer;
-use crate::files::{PairingId, PlanRow, Rig, Robot, RowKind, RowMargins};
+use crate::files::{Dataset, PairingId, PlanRow, PoseRow, Rig, Robot, RowKind, RowMargins};
 use crate::units::{mm_from_m, tidy};
 
 /// What to plan.
@@ -43,13 +44,6 @@ pub struct PlanOptions {
     pub pace: Pace,
     /// The same seed gives the same plan.
     pub seed: u64,
-}
-
-impl PlanOptions {
-    /// What planning is counted in, for progress: crossings looked for, in every family of postures.
-    pub fn ticks(&self) -> usize {
-        self.pairings.len() * self.bars_m.len() * self.poses_per_shell * FAMILIES
-    }
 }
 
 /// Why there is no plan.
@@ -142,6 +136,8 @@ pub struct Plan {
     pub expectation: Expectation,
     /// How well; `None` when there is nothing to tell.
     pub quality: Option<Quality>,
+    /// Why a fit to them could not be trusted.
+    pub unfit: Option<Unfit>,
     /// With `--optimal`.
     pub comparison: Option<Comparison>,
     /// From the first row to the last, standing still included, attaching the bar not; seconds.
@@ -150,19 +146,45 @@ pub struct Plan {
     pub is_closed_form: bool,
 }
 
-/// Plans; `tick` is called with numbers that add up to [`PlanOptions::ticks`].
+impl Plan {
+    /// The poses to measure, as if each had been measured without an error.
+    pub fn as_dataset(&self, rig: &Rig) -> Dataset {
+        let measured = self.rows.iter().filter(|row| row.kind == RowKind::Measure);
+        let pose = |(i, row): (usize, &PlanRow)| PoseRow {
+            pairing: row.pairing,
+            measurement: Measurement {
+                pairing: rig.pairing(row.pairing),
+                q: row.q,
+                length_m: row.bar.map_or(row.bar_m, |bar| bar.length_m),
+                weight: 1.0,
+            },
+            sigma_m: None,
+            set: None,
+            t_s: None,
+            bar_m: Some(row.bar_m),
+            motion: None,
+            file: 0,
+            line: i + 1,
+            number: i + 1,
+        };
+        Dataset { rows: measured.enumerate().map(pose).collect(), files: Vec::new() }
+    }
+}
+
+/// Plans, and tells of all stages but that of [`super::check()`].
 ///
 /// # Errors
 /// [`PlanError`] when fixtures overlap, a shell cannot be reached, or `optimal` asks for what cannot be.
-pub fn plan(robot: &Robot, rig: &Rig, options: &PlanOptions, tick: &(dyn Fn(usize) + Sync)) -> Result<Plan, PlanError> {
+pub fn plan(robot: &Robot, rig: &Rig, options: &PlanOptions, tell: &Tell<'_>) -> Result<Plan, PlanError> {
     let cell = Cell::new(robot, rig, options.travel_m, options.margins, options.pace)?;
-    let mut roads = all_roads(&cell, options, tick);
+    let mut roads = all_roads(&cell, options, tell);
     for road in &roads {
         if road.nodes.is_empty() {
             return Err(out_of_reach(&cell, road));
         }
     }
     let grid: Vec<Vec<usize>> = roads.iter().map(ShellRoads::one_per_crossing).collect();
+    let choosing = Ongoing::begin(Stage::Choice, 1, tell);
     let (chosen, comparison) = match options.optimal {
         Some(wanted) => {
             let (chosen, comparison) = choose(&cell, &roads, &grid, wanted)?;
@@ -170,14 +192,15 @@ pub fn plan(robot: &Robot, rig: &Rig, options: &PlanOptions, tick: &(dyn Fn(usiz
         }
         None => (grid.clone(), None),
     };
-    let tours = all_tours(&cell, &mut roads, &chosen);
+    choosing.tick(1);
+    let tours = all_tours(&cell, &mut roads, &chosen, tell);
 
-    let mut plan = assemble(&cell, &roads, &grid, tours, options.seed);
+    let mut plan = assemble(&cell, &roads, &grid, tours, options.seed, tell);
     plan.comparison = comparison;
     Ok(plan)
 }
 
-fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn(usize) + Sync)) -> Vec<ShellRoads> {
+fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tell: &Tell<'_>) -> Vec<ShellRoads> {
     /// Postures at each point, for a choice to have a choice.
     const CHOICES_PER_CROSSING: usize = 3;
     let per_crossing = if options.optimal.is_some() { CHOICES_PER_CROSSING } else { 1 };
@@ -187,19 +210,22 @@ fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tick: &(dyn Fn(usize) + Syn
         .flat_map(|&bar_m| options.pairings.iter().map(move |&id| (bar_m, id)))
         .map(|(bar_m, id)| Shell { id, pairing: cell.rig.pairing(id), bar_m })
         .collect();
+    let ticks = FAMILIES * options.grid.crossings().len();
+    let progress = Ongoing::begin(Stage::Postures, shells.len() * ticks, tell);
     let all = on_all_cores(shells.len(), |i| {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
         rng.set_stream(i as u64);
-        families(cell, shells[i], &options.grid, wanted, &mut rng, &|count| tick(count))
+        families(cell, shells[i], &options.grid, wanted, &mut rng, &progress.part(ticks))
     });
-    most_telling(cell.robot.chain.parameter_count(), in_one_piece(cell, all, options.seed))
+    most_telling(cell.robot.chain.parameter_count(), in_one_piece(cell, all, options.seed, tell))
 }
 
-fn all_tours(cell: &Cell<'_>, roads: &mut [ShellRoads], chosen: &[Vec<usize>]) -> Vec<Vec<Stop>> {
+fn all_tours(cell: &Cell<'_>, roads: &mut [ShellRoads], chosen: &[Vec<usize>], tell: &Tell<'_>) -> Vec<Vec<Stop>> {
+    let progress = Ongoing::begin(Stage::Tours, roads.len() * TOURS, tell);
     let each: Vec<Mutex<&mut ShellRoads>> = roads.iter_mut().map(Mutex::new).collect();
     on_all_cores(each.len(), |i| {
         let mut road = each[i].lock().unwrap_or_else(PoisonError::into_inner);
-        road.tour(cell, &chosen[i])
+        road.tour(cell, &chosen[i], &progress.part(TOURS))
     })
 }
 
@@ -256,7 +282,15 @@ fn measurement(shell: &Shell, q: &JointVector<f64>) -> Measurement<f64> {
 }
 
 /// Rows in order, with the moves between shells, and what is to be said of them.
-fn assemble(cell: &Cell<'_>, roads: &[ShellRoads], grid: &[Vec<usize>], tours: Vec<Vec<Stop>>, seed: u64) -> Plan {
+fn assemble(
+    cell: &Cell<'_>,
+    roads: &[ShellRoads],
+    grid: &[Vec<usize>],
+    tours: Vec<Vec<Stop>>,
+    seed: u64,
+    tell: &Tell<'_>,
+) -> Plan {
+    let progress = Ongoing::begin(Stage::Moves, roads.len(), tell);
     let mut rows: Vec<PlanRow> = Vec::new();
     let mut shells = Vec::new();
     let mut measurements = Vec::new();
@@ -296,6 +330,7 @@ fn assemble(cell: &Cell<'_>, roads: &[ShellRoads], grid: &[Vec<usize>], tours: V
             is_approach_clear: approach.is_none_or(|found| found.is_some()),
         });
         rows.extend(stops.iter().map(|(kind, q)| row(cell, &road.shell, *kind, q, true)));
+        progress.tick(1);
     }
     let moves_s: f64 = rows.windows(2).map(|pair| cell.seconds(&pair[0].q, &pair[1].q)).sum();
     let expectation = Expectation::new(&cell.robot.chain, &measurements, &cell.robot.limits);
@@ -304,6 +339,7 @@ fn assemble(cell: &Cell<'_>, roads: &[ShellRoads], grid: &[Vec<usize>], tours: V
         duration_s: moves_s + cell.pace.settle_s * measurements.len() as f64,
         rows,
         shells,
+        unfit: Unfit::of(&cell.robot.chain, &cell.robot.limits, measurements.len(), &expectation, quality.as_ref()),
         expectation,
         quality,
         comparison: None,

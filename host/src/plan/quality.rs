@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cell::plausible_deviation;
+use super::experience::NOISE_M;
 use super::information::information;
 use crate::files::JointLimits;
 use crate::identify::{Identifiability, Observation, Spectrum};
@@ -97,6 +98,61 @@ impl Quality {
             amplification: amplification(chain, limits, subset, &scales, &covariance),
         })
     }
+}
+
+/// Why no fit to some poses could be trusted, whatever is measured at them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unfit {
+    /// No more poses than parameters: lengths can be met exactly, noise and all.
+    FewPoses {
+        /// Poses.
+        poses: usize,
+        /// Parameters to be told.
+        parameters: usize,
+    },
+    /// Some parameters change no length, or only as others do.
+    Rank {
+        /// Parameters that can be told.
+        rank: usize,
+        /// Parameters to be told.
+        parameters: usize,
+    },
+    /// Noise alone would move the tool farther than a design is plausibly off.
+    Noise {
+        /// RMS error of the tool as a multiple of the noise.
+        amplification: f64,
+        /// RMS error of the tool by usual noise, metres.
+        tool_m: f64,
+        /// RMS error of the tool by what a design is plausibly off, metres.
+        design_m: f64,
+    },
+}
+
+impl Unfit {
+    /// Judges poses; `quality` is over [`Expectation::identified`].
+    pub fn of(
+        chain: &Chain<f64>,
+        limits: &[JointLimits],
+        poses: usize,
+        expectation: &Expectation,
+        quality: Option<&Quality>,
+    ) -> Option<Self> {
+        let parameters = expectation.independent;
+        if poses <= parameters {
+            return Some(Self::FewPoses { poses, parameters });
+        }
+        let quality = quality.filter(|_| expectation.rank >= parameters);
+        let Some(quality) = quality else { return Some(Self::Rank { rank: expectation.rank, parameters }) };
+        let tool_m = quality.amplification * NOISE_M;
+        let design_m = design_error_m(chain, limits, &expectation.identified);
+        (tool_m > design_m).then_some(Self::Noise { amplification: quality.amplification, tool_m, design_m })
+    }
+}
+
+/// RMS error of the tool over the workspace when every parameter of an independent subset is off by its plausible deviation, metres.
+fn design_error_m(chain: &Chain<f64>, limits: &[JointLimits], subset: &[usize]) -> f64 {
+    let scales: Vec<f64> = subset.iter().map(|&index| plausible_deviation(chain.unit(Parameter::from_index(index)))).collect();
+    amplification(chain, limits, subset, &scales, &DMatrix::identity(subset.len(), subset.len()))
 }
 
 /// `√(mean trace(P C Pᵀ))` over random poses, `P` the tool's position by the scaled parameters.

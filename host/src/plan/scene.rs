@@ -110,18 +110,24 @@ impl Scene {
 
     /// The nearest two things at a posture, with the bar on the pairing, or without the bar.
     pub fn nearest(&self, posture: &Posture, attached: Option<PairingId>) -> Nearest {
+        let mut least = Least::below(f64::INFINITY);
+        self.see_all(posture, attached, &mut least);
+        least.nearest
+    }
+
+    /// Whether any two things are at least so far apart: quicker than to ask for the nearest.
+    pub fn is_apart(&self, posture: &Posture, attached: Option<PairingId>, gap_m: f64) -> bool {
+        let mut least = Least::below(gap_m);
+        self.see_all(posture, attached, &mut least);
+        least.nearest.gap_m >= gap_m
+    }
+
+    fn see_all(&self, posture: &Posture, attached: Option<PairingId>, least: &mut Least) {
         let segments = self.segments(posture);
-        let mut nearest = Nearest { gap_m: f64::INFINITY, contact: Contact::ToolTable };
-        let mut see = |gap_m: f64, contact: Contact| {
-            if gap_m < nearest.gap_m {
-                nearest = Nearest { gap_m, contact };
-            }
-        };
         if let Some(pairing) = attached {
-            self.see_bar(posture, &segments, pairing, &mut see);
+            self.see_bar(posture, &segments, pairing, least);
         }
-        self.see_robot(posture, &segments, &mut see);
-        nearest
+        self.see_robot(posture, &segments, least);
     }
 
     fn segments(&self, posture: &Posture) -> heapless::Vec<Segment, MAX_BODIES> {
@@ -157,49 +163,51 @@ impl Scene {
         plate.distance_to_segment(&segments[body]) - self.bodies[body].radius_m
     }
 
-    fn see_bar(&self, posture: &Posture, segments: &[Segment], pairing: PairingId, see: &mut impl FnMut(f64, Contact)) {
+    fn see_bar(&self, posture: &Posture, segments: &[Segment], pairing: PairingId, least: &mut Least) {
         let radius_m = self.solids.bar_radius_m;
         let sphere = |index: usize| posture.point_in_base(&self.spheres_tool_m[index]);
         let bar = Segment { from_m: self.chucks_m[pairing.chuck], to_m: sphere(pairing.sphere) };
-        see(bar.from_m.z.min(bar.to_m.z) - self.table_z_m - radius_m, Contact::BarTable);
-        see(self.chuck_plate.distance_to_segment(&bar) - radius_m, Contact::BarChuckPlate);
-        see(self.sphere_plate(posture).distance_to_segment(&bar) - radius_m, Contact::BarSpherePlate);
+        least.see(bar.from_m.z.min(bar.to_m.z) - self.table_z_m - radius_m, Contact::BarTable);
+        least.see_disc(&self.chuck_plate, &bar, radius_m, Contact::BarChuckPlate);
+        least.see_disc(&self.sphere_plate(posture), &bar, radius_m, Contact::BarSpherePlate);
         for (_, chuck_m) in self.chucks_m.iter().enumerate().filter(|(i, _)| *i != pairing.chuck) {
-            see(bar.distance_to_point(chuck_m) - radius_m - self.solids.chuck_radius_m, Contact::BarChuck);
+            least.see(bar.distance_to_point(chuck_m) - radius_m - self.solids.chuck_radius_m, Contact::BarChuck);
         }
         for i in (0..self.spheres_tool_m.len()).filter(|&i| i != pairing.sphere) {
-            see(bar.distance_to_point(&sphere(i)) - radius_m - self.solids.sphere_radius_m, Contact::BarSphere);
+            least.see(bar.distance_to_point(&sphere(i)) - radius_m - self.solids.sphere_radius_m, Contact::BarSphere);
         }
         for (body, segment) in self.bodies.iter().zip(segments) {
-            see(bar.distance_to_segment(segment) - radius_m - body.radius_m, Contact::BarLink(body.link + 1));
+            least.see(bar.distance_to_segment(segment) - radius_m - body.radius_m, Contact::BarLink(body.link + 1));
         }
     }
 
-    fn see_robot(&self, posture: &Posture, segments: &[Segment], see: &mut impl FnMut(f64, Contact)) {
+    fn see_robot(&self, posture: &Posture, segments: &[Segment], least: &mut Least) {
         // The first is the robot's foot, which stands on the table.
         for (body, segment) in self.bodies.iter().zip(segments).skip(1) {
             let number = body.link + 1;
-            see(segment.from_m.z.min(segment.to_m.z) - self.table_z_m - body.radius_m, Contact::LinkTable(number));
-            see(self.chuck_plate.distance_to_segment(segment) - body.radius_m, Contact::LinkChucks(number));
+            let height_m = segment.from_m.z.min(segment.to_m.z);
+            least.see(height_m - self.table_z_m - body.radius_m, Contact::LinkTable(number));
+            least.see_disc(&self.chuck_plate, segment, body.radius_m, Contact::LinkChucks(number));
             for chuck_m in &self.chucks_m {
                 let gap_m = segment.distance_to_point(chuck_m) - body.radius_m - self.solids.chuck_radius_m;
-                see(gap_m, Contact::LinkChucks(number));
+                least.see(gap_m, Contact::LinkChucks(number));
             }
         }
         for &(a, b) in &self.body_pairs {
-            see(self.links_gap_m(segments, a, b), Contact::Links(self.bodies[a].link + 1, self.bodies[b].link + 1));
+            least.see(self.links_gap_m(segments, a, b), Contact::Links(self.bodies[a].link + 1, self.bodies[b].link + 1));
         }
         let plate = self.sphere_plate(posture);
-        see(plate.lowest_z_m() - self.table_z_m, Contact::ToolTable);
+        least.see(plate.lowest_z_m() - self.table_z_m, Contact::ToolTable);
         for chuck_m in &self.chucks_m {
-            see(plate.distance_to_point(chuck_m) - self.solids.chuck_radius_m, Contact::ToolTable);
+            least.see(plate.distance_to_point(chuck_m) - self.solids.chuck_radius_m, Contact::ToolTable);
         }
         for sphere_m in self.spheres_tool_m.iter().map(|sphere_m| posture.point_in_base(sphere_m)) {
-            see(sphere_m.z - self.table_z_m - self.solids.sphere_radius_m, Contact::ToolTable);
-            see(self.chuck_plate.distance_to_point(&sphere_m) - self.solids.sphere_radius_m, Contact::ToolTable);
+            least.see(sphere_m.z - self.table_z_m - self.solids.sphere_radius_m, Contact::ToolTable);
+            least.see(self.chuck_plate.distance_to_point(&sphere_m) - self.solids.sphere_radius_m, Contact::ToolTable);
         }
         for &body in &self.tool_bodies {
-            see(self.tool_gap_m(segments, &plate, body), Contact::ToolLink(self.bodies[body].link + 1));
+            let contact = Contact::ToolLink(self.bodies[body].link + 1);
+            least.see_disc(&plate, &segments[body], self.bodies[body].radius_m, contact);
         }
     }
 
@@ -250,6 +258,31 @@ impl Scene {
             part(format!("a bar on sphere {}", sphere.name), "the sphere plate", bar(plate_m), clearance_m)?;
         }
         Ok(())
+    }
+}
+
+/// The least gap seen so far.
+struct Least {
+    nearest: Nearest,
+}
+
+impl Least {
+    /// Only what is nearer than this will be seen.
+    fn below(gap_m: f64) -> Self {
+        Self { nearest: Nearest { gap_m, contact: Contact::ToolTable } }
+    }
+
+    fn see(&mut self, gap_m: f64, contact: Contact) {
+        if gap_m < self.nearest.gap_m {
+            self.nearest = Nearest { gap_m, contact };
+        }
+    }
+
+    /// A disc and a capsule: most are far apart, and then a ball about the disc is already farther than what was seen.
+    fn see_disc(&mut self, disc: &Disc, segment: &Segment, radius_m: f64, contact: Contact) {
+        if disc.least_distance_to_segment(segment) - radius_m < self.nearest.gap_m {
+            self.see(disc.distance_to_segment(segment) - radius_m, contact);
+        }
     }
 }
 

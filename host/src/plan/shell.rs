@@ -9,6 +9,7 @@ use super::cell::Cell;
 use super::grid::Crossing;
 use super::order::{improve, short_order};
 use super::posture::{Hindrance, Shell};
+use super::progress::Part;
 use super::way;
 
 /// A posture at a crossing.
@@ -44,7 +45,7 @@ pub(super) enum Stop {
 }
 
 /// Tours that are looked at, each without the legs that turned out to be blocked in those before.
-const TOURS: usize = 25;
+pub(super) const TOURS: usize = 25;
 
 impl ShellRoads {
     /// Forgets all nodes that are not kept.
@@ -89,11 +90,12 @@ impl ShellRoads {
     ///
     /// Legs are looked at when a tour wants them: a leg that turns out longer than the straight line, or blocked, counts with
     /// what it really takes, and the tour is improved again.
-    pub(super) fn tour(&mut self, cell: &Cell<'_>, chosen: &[usize]) -> Vec<Stop> {
+    pub(super) fn tour(&mut self, cell: &Cell<'_>, chosen: &[usize], progress: &Part<'_>) -> Vec<Stop> {
         let (a, b) = (|i: usize| &self.nodes[chosen[i]].q, |i: usize| &self.nodes[chosen[i]].q);
         let mut seconds = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| cell.seconds(a(i), b(j)));
         let mut order = short_order(&seconds);
         for _ in 0..TOURS {
+            progress.tick();
             let mut is_as_long_as_thought = true;
             for pair in order.windows(2) {
                 let (i, j) = (pair[0], pair[1]);

@@ -75,7 +75,7 @@ pub(super) fn is_sound(cell: &Cell<'_>, attached: Option<&Shell>, q: &JointVecto
         |shell: &Shell| cell.travel_margin_m(q, &shell.pairing, shell.bar_m) >= cell.margins.travel_m + SAMPLING_GUARD_M;
     cell.keeps_limits(q)
         && attached.is_none_or(keeps_travel)
-        && cell.nearest(&cell.posture(q), attached.map(|shell| shell.id)).gap_m >= cell.margins.clearance_m + spare_m
+        && cell.scene.is_apart(&cell.posture(q), attached.map(|shell| shell.id), cell.margins.clearance_m + spare_m)
 }
 
 /// The joint vector nearest to `q`, to first order, at which the bar is at mid travel.
