@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 /// Builds the binary once (nothing to do when it is fresh). A test is named with it, the smallest: so the libraries have the features
 /// that `cargo test --workspace` gave them, and none is compiled a second time.
 static HOST_CAL: LazyLock<PathBuf> = LazyLock::new(|| {
-    let build = escargot::CargoBuild::new().bin("host-cal").args(["--workspace", "--test", "image_sizes"]);
+    let build = escargot::CargoBuild::new().bin("host-cal").args(["--workspace", "--test", "images"]);
     build.run().expect("host-cal builds").path().to_owned()
 });
 

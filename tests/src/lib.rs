@@ -23,6 +23,7 @@ pub mod raw_payload;
 pub mod readers;
 #[cfg(unix)]
 pub mod scenarios;
+pub mod shells;
 #[cfg(unix)]
 pub mod simulated_cell;
 pub mod solids;
@@ -31,4 +32,5 @@ pub mod tampered_line;
 #[cfg(unix)]
 pub mod terminal;
 pub mod wire_schema;
+pub mod workbench;
 pub mod workspace;

@@ -1,0 +1,12 @@
+//! Numbers: golden values, derivatives, ranks, precision, real data.
+
+mod assessments;
+mod golden;
+mod gradients;
+mod identification;
+mod normal_equations;
+mod precision;
+mod ranks;
+mod real_data;
+mod report_proofs;
+mod robots;
