@@ -209,7 +209,6 @@ pub struct Reply {
 
 /// What a command brings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
-#[expect(clippy::large_enum_variant, reason = "there is no heap to box on, and one message at a time")]
 pub enum Answer {
     /// It is done.
     Done,
