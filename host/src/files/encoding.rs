@@ -9,18 +9,18 @@ use super::source::{InputError, Source};
 /// letter in a name would be another name.
 pub(super) fn decode(name: &str, bytes: &[u8], declared: Option<&'static Encoding>) -> Result<Source, InputError> {
     let (encoding, mark) = Encoding::for_bom(bytes).unwrap_or((declared.unwrap_or(UTF_8), 0));
-    let Some(text) = encoding.decode_without_bom_handling_and_without_replacement(&bytes[mark..]) else {
-        let (text, _) = encoding.decode_without_bom_handling(&bytes[mark..]);
-        let source = Source::new(name, &text);
+    let (text, is_damaged) = encoding.decode_without_bom_handling(&bytes[mark..]);
+    let source = Source::new(name, &text);
+    // First, since UTF-16 without its mark is full of them.
+    if let Some(at) = source.text().find('\0') {
+        return Err(InputError::at(&source, at..at + 1, Problem::ZeroByte));
+    }
+    if is_damaged {
         let at = source.text().find(char::REPLACEMENT_CHARACTER).unwrap_or(0);
         let problem = Problem::NotText { encoding: encoding.name() };
         return Err(InputError::at(&source, at..at + char::REPLACEMENT_CHARACTER.len_utf8(), problem));
-    };
-    let source = Source::new(name, &text);
-    match source.text().find('\0') {
-        None => Ok(source),
-        Some(at) => Err(InputError::at(&source, at..at + 1, Problem::ZeroByte)),
     }
+    Ok(source)
 }
 
 /// The encoding that the first line of an XML document says.

@@ -114,9 +114,9 @@ impl Disc {
                 break;
             }
             if here.1 < 0.0 {
-                low = share
+                low = share;
             } else {
-                high = share
+                high = share;
             }
             let newton = share - here.1 / here.2;
             let next = if newton > low && newton < high { newton } else { (low + high) / 2.0 };

@@ -109,6 +109,9 @@ const SESSION: [&str; 8] = [
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
+        if entry.is_symlink() && entry.is_dir() {
+            continue;
+        }
         if entry.is_dir() {
             found.extend(files(&entry));
         } else {
