@@ -28,7 +28,7 @@ pub(super) struct LogArgs {
 
 #[derive(Subcommand)]
 enum LogCommand {
-    /// Read a log to its end and say what it holds and what it lacks, and which of its poses poses.csv lacks
+    /// Read a log to its end and say what it holds, what it lacks, and what poses.csv lacks of it
     #[command(after_help = "Example:\n  host-cal log check today\n\nExit code 1 when something is missing or damaged.")]
     Check {
         /// A session's directory, or its stream.bbl
@@ -36,7 +36,7 @@ enum LogCommand {
         #[command(flatten)]
         output: OutputArgs,
     },
-    /// Write the poses that a log holds and poses.csv lacks into it, as the next recording would
+    /// Write into poses.csv what it lacks of the log, as the next recording would
     #[command(
         after_help = "Example:\n  host-cal log recover today\n\nPoses that were erased stay so; to take another one out for good, put # before its line in poses.csv."
     )]

@@ -1,7 +1,6 @@
 //! Files with bytes changed at random: a reader takes them or says what is wrong, and never panics.
 
 use ballbar_tests::workbench::{POSES, RIG, ROBOT, Workbench};
-#[expect(dead_code, reason = "refusals are counted elsewhere")]
 use host_cal::files::{
     Calibration, CalibrationVerdict, Dataset, InputError, Rig, Robot, Source, UrdfEnds, parse_urdf, read_targets, write_poses,
 };
