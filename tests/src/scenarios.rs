@@ -210,7 +210,12 @@ impl Recording {
     fn read_log(&mut self) {
         let mut log = LogReader::open(self.folder.path()).expect("the session has a log");
         while let Some(record) = log.next_record().expect("the log can be read") {
-            let Record::Message(message) = record else { panic!("a damaged frame in the log") };
+            let message = match record {
+                Record::Message(message) => message,
+                Record::Mark(_) => continue,
+                Record::Refused(reason) => panic!("a message that is not believed: {reason}"),
+                Record::Damaged => panic!("a damaged frame in the log"),
+            };
             let ToHost::Stream(stream) = *message else { continue };
             match stream.event {
                 Event::Samples(batch) => self.samples.extend(batch.samples()),

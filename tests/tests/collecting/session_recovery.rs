@@ -27,6 +27,8 @@ struct Recording {
     set: ParameterSet,
     rule: SettledRule,
     sequence: u32,
+    /// The board's clock at the latest event, microseconds; it samples a thousand times a second.
+    t_us: u64,
     states: Vec<State>,
     /// Lengths of the log from which on it holds a pose, and the pose's time, microseconds.
     poses: Vec<(u64, u64)>,
@@ -42,6 +44,10 @@ struct State {
 
 fn connection() -> Connection {
     Connection { chuck: "A".into(), sphere: "1".into(), bar_m: 0.46 }
+}
+
+fn index_at(t_us: u64) -> u32 {
+    (t_us / 1_000) as u32
 }
 
 fn frame(message: &ToHost) -> Vec<u8> {
@@ -71,7 +77,7 @@ impl Recording {
         let robot = RobotOnBoard::new(set.clone()).unwrap();
         let (folder, rule) = (TempDir::new().unwrap(), SettledRule::new(StillnessCriteria::default()));
         let (states, poses, erased) = (Vec::new(), Vec::new(), Vec::new());
-        let mut recording = Self { folder, recorder: None, robot, set, rule, sequence: 0, states, poses, erased };
+        let mut recording = Self { folder, recorder: None, robot, set, rule, sequence: 0, t_us: 0, states, poses, erased };
         recording.begin();
         recording
     }
@@ -114,7 +120,9 @@ impl Recording {
 
     fn sample(&mut self) -> &mut Self {
         let lvdt = LvdtReading { code: 32_768, saturated: false };
-        let sample = Sample { index: 0, t_us: 1, counts: [5; 6].into_iter().collect(), lvdt };
+        self.t_us += 1_000;
+        let (index, t_us) = (index_at(self.t_us), self.t_us);
+        let sample = Sample { index, t_us, counts: [5; 6].into_iter().collect(), lvdt };
         self.event(ALL_HOMED, Event::Samples(SampleBatch::new(sample)));
         self.keep_state();
         self
@@ -122,8 +130,9 @@ impl Recording {
 
     /// The arm settles; `stream` decides as it does.
     fn settle(&mut self, t_us: u64, counts: f64, code: f64, homed: u8) -> &mut Self {
+        self.t_us = t_us;
         let pose = SettledPose {
-            index: 0,
+            index: index_at(t_us),
             t_us,
             duration_us: 500_001,
             samples: 500,
@@ -136,7 +145,9 @@ impl Recording {
         let log_bytes = self.log_bytes();
         self.keep_state();
         let fate = self.rule.judge(&self.robot, &pose, homed);
-        if let SettledFate::Kept(pose) = fate {
+        if let SettledFate::Kept(pose) = fate
+            && self.recorder().writes_poses()
+        {
             self.poses.push((log_bytes, us(pose.t_s)));
             self.recorder().poses(&[pose]).unwrap();
         }
@@ -161,9 +172,10 @@ impl Recording {
     }
 
     fn erase(&mut self) -> &mut Self {
+        let before = self.log_bytes();
         let erased = self.recorder().erase_last().unwrap();
-        let log_bytes = self.log_bytes();
-        self.erased.extend(erased.times_us.into_iter().map(|t_us| (log_bytes, t_us)));
+        let mark_bytes = (self.log_bytes() - before) / erased.times_us.len() as u64;
+        self.erased.extend((1..).zip(erased.times_us).map(|(number, t_us)| (before + number * mark_bytes, t_us)));
         self.keep_state();
         self
     }
@@ -280,7 +292,7 @@ fn a_killed_stream_loses_no_settled_pose_and_writes_none_twice() {
 fn a_killed_collection_loses_no_pose_that_was_taken_and_brings_no_erased_one_back() {
     let mut recording = Recording::new();
     recording.settle(900_000, 1.0, 30_000.0, ALL_HOMED);
-    recording.poses.clear();
+    assert!(recording.poses.is_empty(), "nobody knows what the bar joins");
     recording.connect(Some(connection()));
     recording.measure(&[1.25], Some(2)).measure(&[2.5, 2.75, 3.25], Some(3)).erase().measure(&[4.5], Some(5));
     recording.connect(None).connect(Some(Connection { chuck: "B".into(), ..connection() })).measure(&[5.5], Some(9)).erase();

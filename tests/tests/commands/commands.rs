@@ -167,9 +167,9 @@ fn fit_writes_a_robot_that_keeps_the_comments_and_that_every_command_reads() {
 
     // A calibrated robot is a design like another: fitted anew, with more free, its table is replaced.
     runs(&folder, &[&FIT, &["--hold", "auto,x1,z1,y3", "--out", "calibrated.toml"]]);
-    let again = ["fit", "--robot", "calibrated.toml", "--rig", "triangles", "other.csv", "poses.csv", "--out", "calibrated.toml"];
+    let again = ["fit", "--robot", "calibrated.toml", "--rig", "triangles", "other.csv", "poses.csv", "--out", "again.toml"];
     runs(&folder, &[&again]);
-    let text = read(&folder, "calibrated.toml");
+    let text = read(&folder, "again.toml");
     assert_eq!(text.matches("\n[calibration]\n").count(), 1);
     assert_eq!(text.matches("# CALIBRATED").count(), 1);
     assert!(

@@ -389,7 +389,9 @@ fn a_hostile_name_on_the_board_is_shown_harmless_by_every_command() {
         &["stream", "port", "--for", "1s", "--session", "s"],
     ];
     for command in commands.iter().flat_map(|command| [command.to_vec(), [command, &["--json"][..]].concat()]) {
-        let run = good(folder, &command);
+        let run = run(folder, &command);
+        // Without a bar the LVDT has no signal, which the self-test says.
+        assert!(run.code == 0 || (run.code, command[0]) == (1, "status"), "{command:?}: {}", run.transcript());
         let hidden = |text: &String| text.chars().find(|&c| c != '\n' && host_cal::text::is_hidden(c));
         assert_eq!((hidden(&run.stdout), hidden(&run.stderr)), (None, None), "{command:?}: {}", run.transcript());
     }

@@ -39,7 +39,7 @@ impl Bench {
     }
 
     fn export(&self, format: &str, file: &str, more: &[&str]) {
-        let arguments = ["export", "--robot", "calibrated.toml", "--format", format, "--out", file];
+        let arguments = ["export", "--robot", "calibrated.toml", "--format", format, "--force", "--out", file];
         let run = host_cal_in(self.folder.path(), &[&arguments, more].concat());
         assert_eq!(run.code, 0, "{}", run.transcript());
     }

@@ -317,7 +317,7 @@ fn an_export_that_is_refused_changes_nothing() {
         (3, ["--csv", "a.csv", "--mcap", &"n".repeat(300)], "File name too long"),
     ] {
         fs::write(log.path().join("a.csv"), "older").expect("an older file");
-        let run = log.export(&[&["log", "export", "s"][..], &args].concat());
+        let run = log.export(&[&["log", "export", "s", "--force"][..], &args].concat());
         assert!(run.code == code && run.stderr.contains(message), "{args:?}: {}", run.transcript());
         assert_eq!(names(), ["a.csv", "s"], "{args:?}");
         assert_eq!(fs::read_to_string(log.path().join("a.csv")).expect("the older file"), "older", "{args:?}");
@@ -387,7 +387,7 @@ fn an_older_files_permissions_and_links_are_kept() {
     fs::write(&csv, "older").expect("an older file");
     symlink("a.csv", &link).expect("a link");
     let to_mode = |mode| fs::set_permissions(&csv, PermissionsExt::from_mode(mode)).expect("its permissions");
-    let export = || log.export(&["log", "export", "s", "--csv", "link.csv"]);
+    let export = || log.export(&["log", "export", "s", "--csv", "link.csv", "--force"]);
 
     to_mode(0o444);
     let refused = export();

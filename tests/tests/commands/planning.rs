@@ -433,7 +433,7 @@ fn a_plan_that_no_fit_could_use_says_so() {
 
 #[test]
 fn what_cannot_be_planned_is_refused() {
-    const PUMA: [&str; 5] = ["plan", "--robot", "puma560", "--out", "old.toml"];
+    const PUMA: [&str; 6] = ["plan", "--robot", "puma560", "--out", "old.toml", "--force"];
     let bench = Workbench::new();
     let rig = workbench::RIG;
     bench.put("solids.toml", format!("{rig}\n[solids]\nlink_radius_mm = -3.0\n"));

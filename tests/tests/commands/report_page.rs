@@ -196,6 +196,7 @@ fn a_page_of_very_many_poses_is_no_larger_than_one_of_many() {
     let of_many = |count: usize| {
         let mut facts = facts.clone();
         facts.rows = in_turn(&facts.rows, 9, count);
+        facts.assessment.order.places = (0..count).map(|place| place as f64).collect();
         for proof in &mut facts.assessment.proofs {
             proof.before = in_turn(&proof.before, 9, count);
             proof.after = in_turn(&proof.after, 9, count);
