@@ -133,11 +133,10 @@ fn exchanges(what: &str, ends: &[NamedPoint], used: &HashSet<usize>, remedy: fn(
     for (i, &a) in in_rings.iter().enumerate() {
         for (j, &b) in in_rings.iter().enumerate().skip(i + 1) {
             for &c in &in_rings[j + 1..] {
+                let all = format!("{what} {}, {} and {} look exchanged", name(a), name(b), name(c));
                 for (b, c) in [(b, c), (c, b)] {
                     let (first, second, third) = (name(a), name(b), name(c));
-                    let words = format!(
-                        "{what} {first}, {second} and {third} look exchanged: what is called {first} is {second}, {second} is {third}, {third} is {first}"
-                    );
+                    let words = format!("{all}: what is called {first} is {second}, {second} is {third}, {third} is {first}");
                     mistakes.push(Mistake { words, remedy: standing(&[(a, b), (b, c), (c, a)]) });
                 }
             }

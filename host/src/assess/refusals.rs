@@ -167,11 +167,12 @@ pub(super) fn judge(evidence: &Evidence<'_>, limit: RmsLimit, proofs: &[Proof]) 
     let Evidence { robot, dataset, fit, .. } = evidence;
     let mut refusals = Vec::new();
     let mut is_unchanged = fit.solution.status == Status::AlreadyOptimal;
-    if !fit.solution.status.is_minimum() {
+    let is_minimum = fit.solution.status.is_minimum();
+    if !is_minimum {
         refusals.push(Refusal::NoMinimum(fit.solution.status));
     }
     match proofs.iter().find(|proof| proof.kind == ProofKind::LeftOut) {
-        _ if is_unchanged => {}
+        _ if is_unchanged || !is_minimum => {}
         None => refusals.push(Refusal::Unproven),
         Some(proof) if proof.speaks_for() => {}
         Some(_) if is_as_good(fit, limit) => is_unchanged = true,
