@@ -42,9 +42,11 @@ fn all_54_parameters_of_the_irb_120_give_the_same_residual() {
 #[test]
 fn a_cable_set_of_one_pairing_is_told_its_bounds_and_does_not_run_away() {
     let Some(run) = fit_json("robotcali_irb120", &[]) else { return };
-    assert_eq!(run.code, 0, "{}", run.stderr);
+    // Parts measured in one go are predicted worse than by the design, though every fifth row is predicted better.
+    assert_eq!(run.code, 1, "{}", run.stderr);
     let fit = run.json();
-    assert_eq!(fit["status"], "converged");
+    assert_eq!((&fit["status"], &fit["verdict"]), (&"converged".into(), &"not_trusted".into()));
+    assert!(number(&fit["held_out"], "rms_mm") > number(&fit, "rms_initial_mm"), "{}", fit["held_out"]);
     let remarks = fit["remarks"].to_string();
     assert!(remarks.contains("One pairing (A:1) can identify at most 30 parameters"), "{remarks}");
     assert!(remarks.contains("Residuals follow one another"), "{remarks}");
