@@ -99,10 +99,15 @@ impl<S: Real> JointEncoders<S> {
                 return Err(EncoderError::Coupling { joint: coupling.joint });
             }
         }
-        let mut couplings: Vec<_, MAX_COUPLINGS> = Vec::from_slice(couplings).map_err(|_| EncoderError::TooMany)?;
-        // Values are made from the base outwards, so a joint's own couplings must be done before it turns others along.
-        couplings.sort_unstable_by_key(|coupling| (coupling.joint, coupling.driven_by));
-        Ok(Self { encoders: Vec::from_slice(encoders).map_err(|_| EncoderError::TooMany)?, couplings })
+        // Values are made from the base outwards, so a joint's own couplings must be done before it turns others along. Eight at most
+        // are put in their places one by one: a sort of the standard library takes 8 KiB of the board's flash.
+        let mut ordered: Vec<Coupling<S>, MAX_COUPLINGS> = Vec::new();
+        for coupling in couplings {
+            let is_later = |other: &Coupling<S>| (other.joint, other.driven_by) > (coupling.joint, coupling.driven_by);
+            let place = ordered.iter().position(is_later).unwrap_or(ordered.len());
+            ordered.insert(place, *coupling).map_err(|_| EncoderError::TooMany)?;
+        }
+        Ok(Self { encoders: Vec::from_slice(encoders).map_err(|_| EncoderError::TooMany)?, couplings: ordered })
     }
 
     /// Joint values q, radians or metres, at encoder positions in counts; joints without a position stay at zero.
