@@ -24,8 +24,7 @@ use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, TrackOptions, check_board, remove_lag,
 };
-use crate::files::PlanRow;
-use crate::plan::{Cell, Margins, Pace, check};
+use crate::plan::{Cell, CheckedPlan, Margins, Pace, UnsafePlan};
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run};
@@ -116,9 +115,9 @@ enum ArgumentError {
     #[error("--continuous needs a robot link that this program moves the robot by")]
     #[diagnostic(help("With manual and file every pose is measured standing."))]
     ContinuousByHand,
-    #[error("the plan has {what}")]
+    #[error("the plan has {0}")]
     #[diagnostic(help("Nothing was moved. `host-cal plan --check` says more; plan again, or correct the rig's [solids]."))]
-    UnsafePlan { what: String },
+    UnsafePlan(#[from] UnsafePlan),
     #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
     #[diagnostic(help("Tell it the robot first: host-cal apply PORT --robot robot.toml --uncalibrated"))]
     NoParameters,
@@ -131,31 +130,13 @@ struct FolderError {
     error: std::io::Error,
 }
 
-/// Nothing is moved along a plan that leads into something, whoever wrote or edited it.
-fn check_plan(cell: &Cell<'_>, rows: &[PlanRow]) -> Result<(), ArgumentError> {
-    /// Of a joint, radians or metres.
-    const STEP: f64 = 0.02;
-    let found = check(cell, rows, STEP, 0, 0, &|_| ());
-    let what = if found.limit_rad < 0.0 || found.limit_m < 0.0 {
-        "a joint beyond its limits".to_owned()
-    } else if found.travel_m < 0.0 {
-        "the bar beyond its travel".to_owned()
-    } else if found.clearance_m < 0.0 {
-        let line = rows.get(found.nearest_row).map_or(0, |row| row.line);
-        format!("{} in one another, on the way to line {line}", found.nearest)
-    } else {
-        return Ok(());
-    };
-    Err(ArgumentError::UnsafePlan { what })
-}
-
 impl CollectArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let options = self.options()?;
         let files = SessionFiles::open(&self.session, self.plan.as_deref(), self.robot.as_deref(), self.rig.as_deref())?;
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
         let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default())?;
-        check_plan(&cell, &files.rows)?;
+        let plan = CheckedPlan::new(&cell, &files.rows).map_err(ArgumentError::from)?;
 
         let mut mover = self.mover.open(files.robot.chain.joint_kinds())?;
         if self.continuous && !matches!(mover, Mover::Link(_)) {
@@ -167,15 +148,15 @@ impl CollectArgs {
             check_board(&files.robot, &robot.0, robot.0.is_homed_by(&status))?;
         }
         files.write()?;
-        let guide = self.guide(&mover, &files, &options)?;
+        let guide = self.guide(&mover, &files, &plan, &options)?;
         let recorder = self.recorder(&link, &robot, &mover)?;
-        let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
+        let ledger = Ledger::new(plan, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let board = BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
 
         let head = vec!["collect".into(), self.port.port.clone(), mover.name(), files.robot.name.clone()];
         let mut terminal = Terminal::new(self.hand()?, Still::new(head, &files.robot), EndRequest::listen());
         let began = Instant::now();
-        let mut collector = Collector::new(&cell, ledger, board, &mut terminal, options);
+        let mut collector = Collector::new(ledger, board, &mut terminal, options);
         let ended = match &mut mover {
             Mover::Link(link) => collector.drive(link.as_mut()),
             Mover::Programs(_) | Mover::Hand => collector.follow(self.nearness(), &guide),
@@ -224,9 +205,15 @@ impl CollectArgs {
     }
 
     /// What somebody is told who moves the robot.
-    fn guide(&self, mover: &Mover, files: &SessionFiles, options: &CollectOptions) -> Result<Guide, CommandError> {
+    fn guide(
+        &self,
+        mover: &Mover,
+        files: &SessionFiles,
+        plan: &CheckedPlan<'_>,
+        options: &CollectOptions,
+    ) -> Result<Guide, CommandError> {
         let Mover::Programs(dialect) = mover else { return Ok(Guide::Hand) };
-        let programs = write_programs(&self.session, files, *dialect, options.speed, self.stand_s)?;
+        let programs = write_programs(&self.session, files, plan, *dialect, options.speed, self.stand_s)?;
         Ok(Guide::Programs(programs))
     }
 

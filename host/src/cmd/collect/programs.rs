@@ -7,6 +7,7 @@ use crate::cmd::outcome::CommandError;
 use crate::cmd::report::write_file;
 use crate::collect::{ShellPrograms, shells};
 use crate::files::{PlanRow, RowKind};
+use crate::plan::CheckedPlan;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::program::{Dialect, Program, ProgramStep, write_program};
 
@@ -17,6 +18,7 @@ const FOLDER: &str = "programs";
 pub(super) fn write_programs(
     session: &Path,
     files: &SessionFiles,
+    plan: &CheckedPlan<'_>,
     dialect: Dialect,
     speed: JointSpeed,
     stand_s: f64,
@@ -30,8 +32,8 @@ pub(super) fn write_programs(
     };
     let mut written = Vec::new();
     let mut names = Vec::new();
-    for (number, shell) in (1..).zip(shells(&files.rows)) {
-        let rows = &files.rows[shell];
+    for (number, shell) in (1..).zip(shells(plan.rows())) {
+        let rows = &plan.rows()[shell];
         let first = rows.iter().position(|row| row.bar.is_some()).unwrap_or(0);
         let without_measuring: Vec<PlanRow> =
             rows[..=first].iter().map(|row| PlanRow { kind: RowKind::Via, ..row.clone() }).collect();
