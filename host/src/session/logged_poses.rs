@@ -40,6 +40,8 @@ pub struct LoggedPoses {
     rule: Option<SettledRule>,
     /// A settled pose that is to be kept, and its mark has not come yet.
     undecided: Option<MeasuredPose>,
+    /// Times of poses that are erased when the last of their marks comes.
+    erasing_us: Vec<u64>,
 }
 
 impl LoggedPoses {
@@ -62,6 +64,9 @@ impl LoggedPoses {
 
     /// Takes the next record.
     pub fn take(&mut self, record: &Record) {
+        if !matches!(record, Record::Mark(PoseMark::Erased { .. })) {
+            self.erasing_us.clear();
+        }
         match record {
             Record::Message(message) => self.take_message(message),
             Record::Mark(mark) => self.take_mark(mark),
@@ -142,12 +147,19 @@ impl LoggedPoses {
             }
             PoseMark::Disconnected => (self.connection, self.rule) = (None, None),
             PoseMark::Measured(pose) => self.keep(pose.into()),
-            PoseMark::Erased { t_us } => {
-                if let Some(at) = self.poses.iter().rposition(|logged| time_us(logged.pose.t_s) == *t_us) {
-                    self.poses.remove(at);
-                    self.erased += 1;
+            PoseMark::Erased { times_us, goes_on } => {
+                self.erasing_us.extend(times_us);
+                if !goes_on {
+                    std::mem::take(&mut self.erasing_us).into_iter().for_each(|t_us| self.erase(t_us));
                 }
             }
+        }
+    }
+
+    fn erase(&mut self, t_us: u64) {
+        if let Some(at) = self.poses.iter().rposition(|logged| time_us(logged.pose.t_s) == t_us) {
+            self.poses.remove(at);
+            self.erased += 1;
         }
     }
 
@@ -163,5 +175,39 @@ impl LoggedPoses {
             self.keep(pose);
         }
         (self.robot, self.connection, self.rule) = (None, None, None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ballbar::JointVector;
+
+    use super::*;
+
+    #[test]
+    fn many_poses_are_erased_together_or_not_at_all() {
+        const POSES: u64 = 400;
+        let connection = Connection { chuck: "A".into(), sphere: "1".into(), bar_m: 0.46 };
+        let pose = |i: u64| MeasuredPose {
+            q: JointVector::zero(),
+            displacement_m: 0.0,
+            t_s: i as f64,
+            rate_m_s: None,
+            plan_row: Some(2),
+        };
+        let measured = (0..=POSES).map(|i| PoseMark::measured(&pose(i), 6));
+        let before: Vec<_> = [PoseMark::Connected { connection, every_settled: None }].into_iter().chain(measured).collect();
+        // The first pose stays.
+        let erased: Vec<_> = PoseMark::erased(&(1..=POSES).map(|i| i * 1_000_000).collect::<Vec<_>>()).collect();
+        assert!(erased.len() > 3 && erased.iter().all(|mark| mark.frame().is_some()), "{} marks", erased.len());
+        for come in 0..=erased.len() {
+            let mut logged = LoggedPoses::default();
+            before.iter().chain(&erased[..come]).for_each(|mark| logged.take(&Record::Mark(mark.clone())));
+            // What comes next is no more of them: a killed program's last frame, and the next run.
+            logged.take(&Record::Damaged);
+            logged.take(&Record::Mark(PoseMark::Erased { times_us: Vec::new(), goes_on: false }));
+            let left = if come == erased.len() { 1 } else { POSES as usize + 1 };
+            assert_eq!((logged.count(), logged.erased()), (left, POSES as usize + 1 - left), "{come} marks");
+        }
     }
 }

@@ -23,10 +23,12 @@ pub enum PoseMark {
     Disconnected,
     /// A pose was measured with the bar as it is connected. It goes to poses.csv next.
     Measured(MarkedPose),
-    /// The latest pose of this time was taken out of poses.csv again.
+    /// The latest poses of these times were taken out of poses.csv again.
     Erased {
-        /// Time of the pose by the board's clock, microseconds.
-        t_us: u64,
+        /// Times of the poses by the board's clock, microseconds.
+        times_us: Vec<u64>,
+        /// The next mark has more of them. Poses are erased by the last of a row of marks, or not at all.
+        goes_on: bool,
     },
 }
 
@@ -45,6 +47,9 @@ pub struct MarkedPose {
     pub plan_row: Option<usize>,
 }
 
+/// Times in one mark at most: a time takes ten bytes at most, and a payload holds 1,024.
+const MOST_TIMES: usize = 90;
+
 /// The first byte of a mark: no message of a board begins so, since they are numbered from zero.
 const TAG: u8 = b'P';
 
@@ -58,6 +63,13 @@ impl PoseMark {
     pub(super) fn of_payload(payload: &[u8]) -> Option<Self> {
         let (tag, mark): (u8, Self) = decode(payload)?;
         (tag == TAG).then_some(mark)
+    }
+
+    /// The marks of poses that were taken out together.
+    pub(super) fn erased(times_us: &[u64]) -> impl Iterator<Item = Self> {
+        let marks = times_us.len().div_ceil(MOST_TIMES);
+        let mark = move |(number, times): (usize, &[u64])| Self::Erased { times_us: times.to_vec(), goes_on: number < marks };
+        (1..).zip(times_us.chunks(MOST_TIMES)).map(mark)
     }
 
     /// A pose of a robot with so many joints.

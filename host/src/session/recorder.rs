@@ -195,8 +195,8 @@ impl Recorder {
             && !self.is_change_noted
         {
             self.is_change_noted = true;
-            for t_us in file.taken_out(change) {
-                self.log.pose_mark(&PoseMark::Erased { t_us })?;
+            for mark in PoseMark::erased(&file.taken_out(change)) {
+                self.log.pose_mark(&mark)?;
             }
         }
         Ok(result?)
@@ -230,8 +230,8 @@ impl Recorder {
     pub fn erase_last(&mut self) -> Result<Erased, RecordError> {
         let erased = self.poses.as_mut().map_or(Ok(Erased::default()), PoseFile::erase_last);
         let erased = self.note_change(erased)?;
-        for &t_us in &erased.times_us {
-            self.log.pose_mark(&PoseMark::Erased { t_us })?;
+        for mark in PoseMark::erased(&erased.times_us) {
+            self.log.pose_mark(&mark)?;
         }
         // With less than this on the disk, a power cut would bring them back.
         self.log.sync()?;

@@ -1,7 +1,8 @@
 //! Whatever ends a recording at whatever moment: after the next run every pose that the log holds is in poses.csv, once.
 //!
 //! A killed program leaves a beginning of the log, and poses.csv as it was at that moment or before. So both are taken apart: a
-//! recording is made, the log is cut after every byte, and put beside every state of poses.csv that can have stood beside it.
+//! recording is made, the log is cut at every byte of short frames and many of long ones, and put beside every state of poses.csv that can have
+//! stood beside it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -172,10 +173,9 @@ impl Recording {
     }
 
     fn erase(&mut self) -> &mut Self {
-        let before = self.log_bytes();
         let erased = self.recorder().erase_last().unwrap();
-        let mark_bytes = (self.log_bytes() - before) / erased.times_us.len() as u64;
-        self.erased.extend((1..).zip(erased.times_us).map(|(number, t_us)| (before + number * mark_bytes, t_us)));
+        let log_bytes = self.log_bytes();
+        self.erased.extend(erased.times_us.into_iter().map(|t_us| (log_bytes, t_us)));
         self.keep_state();
         self
     }
