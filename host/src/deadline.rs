@@ -1,5 +1,6 @@
 //! How long a whole answer may take, and the user's wish to end, which no wait outlasts.
 
+use std::io::{Error, ErrorKind, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -70,6 +71,29 @@ impl Deadline {
         }
         if Instant::now() >= self.at { Err(WaitOver::Late) } else { Ok(()) }
     }
+}
+
+/// Whether a peer has only nothing to give, or no room, just now.
+pub(crate) fn is_short_wait(error: &Error) -> bool {
+    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock)
+}
+
+/// Writes all bytes before a deadline.
+///
+/// # Errors
+/// The operating system's reason, or that the peer takes no bytes.
+pub(crate) fn write_before(deadline: &Deadline, peer: &mut (impl Write + ?Sized), mut bytes: &[u8]) -> Result<(), Error> {
+    while !bytes.is_empty() {
+        match peer.write(bytes) {
+            Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
+            Err(error) if is_short_wait(&error) => {}
+            Err(error) => return Err(error),
+        }
+        if !bytes.is_empty() && deadline.check().is_err() {
+            return Err(Error::new(ErrorKind::TimedOut, "it takes no bytes"));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

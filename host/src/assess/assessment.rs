@@ -1,31 +1,15 @@
 //! The answer, and its grounds in whole sentences.
 
+use super::evidence::Evidence;
 use super::order::{Order, by_pairing, offset, trend};
 use super::proof::{Proof, ProofKind, proofs};
 use super::refusals::{Judged, Refusal, RmsLimit, judge};
 use super::reservations::reservations;
 use super::suspicion::{Suspicion, suspect};
-use crate::files::{Calibration, CalibrationVerdict, Dataset, Rig, Robot};
-use crate::identify::{AndersonDarling, Fit, Offset, Residual, Trend, anderson_darling, residuals};
+use crate::files::{Calibration, CalibrationVerdict};
+use crate::identify::{AndersonDarling, Offset, Residual, Trend, anderson_darling, residuals};
 use crate::units::mm_from_m;
 use ballbar::Chain;
-
-/// What a fit is judged from.
-#[derive(Clone, Copy, Debug)]
-pub struct Evidence<'a> {
-    /// The robot that the fit began with: its design, as a rule.
-    pub robot: &'a Robot,
-    /// Chucks and spheres.
-    pub rig: &'a Rig,
-    /// The poses that were fitted.
-    pub dataset: &'a Dataset,
-    /// The fit to them.
-    pub fit: &'a Fit,
-    /// Poses that the fit has not seen, and what to call them; none is empty.
-    pub unseen: &'a [(String, &'a Dataset)],
-    /// The largest RMS residual that is believed, metres, in place of the usual one ([`RmsLimit`]).
-    pub max_rms_m: Option<f64>,
-}
 
 /// What the result is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use std::fmt;
 
 use ballbar::{JointKind, Measurement};
 
-use super::assessment::Evidence;
+use super::evidence::Evidence;
 use crate::files::{NamedPoint, PairingId, PoseRow};
 use crate::identify::{median, residuals};
 use crate::units::{fixed, mm_from_m};

@@ -9,6 +9,7 @@
 //! `docs/identification.md` says what each answer takes and why.
 
 mod assessment;
+mod evidence;
 mod mistake;
 mod order;
 mod plausibility;
@@ -17,7 +18,8 @@ mod refusals;
 mod reservations;
 mod suspicion;
 
-pub use assessment::{Answer, Assessment, Evidence};
+pub use assessment::{Answer, Assessment};
+pub use evidence::Evidence;
 pub use mistake::Mistake;
 pub use order::Order;
 pub use plausibility::Change;

@@ -1,6 +1,6 @@
 //! The order of measurement, and the residuals by pairing: whether they change, or are off as a whole.
 
-use super::assessment::Evidence;
+use super::evidence::Evidence;
 use crate::identify::{Offset, Residual, Trend, farthest_offset};
 
 const SECONDS_PER_MINUTE: f64 = 60.0;

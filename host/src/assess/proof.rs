@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use ballbar::Chain;
 
-use super::assessment::Evidence;
+use super::evidence::Evidence;
 use crate::files::{Dataset, PoseRow};
 use crate::identify::{Residual, ResidualSummary, postures, residuals};
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::assessment::Evidence;
+use super::evidence::Evidence;
 use super::plausibility::{Change, far_beyond_limits, large_changes};
 use super::proof::{Proof, ProofKind};
 use crate::files::Dataset;

@@ -1,6 +1,7 @@
 //! What weighs on the numbers of a fit that is worth keeping, in whole sentences.
 
-use super::assessment::{Answer, Assessment, Evidence};
+use super::assessment::{Answer, Assessment};
+use super::evidence::Evidence;
 use super::plausibility::{far_beyond_limits, large_changes};
 use super::refusals::moved;
 use crate::identify::ALIKE;

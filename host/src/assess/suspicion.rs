@@ -4,7 +4,7 @@ use std::fmt;
 
 use ballbar::{Chain, FreeParameters, Kinematics, Measurement};
 
-use super::assessment::Evidence;
+use super::evidence::Evidence;
 use super::mistake::{Mistake, any_constant, conceivable};
 use super::plausibility::large_changes;
 use super::refusals::Refusal;

@@ -1,12 +1,12 @@
 //! A serial port.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read};
 use std::time::Duration;
 
 use serialport::{SerialPort, SerialPortType};
 
 use super::errors::PortError;
-use crate::deadline::Deadline;
+use crate::deadline::{Deadline, is_short_wait, write_before};
 
 /// Bits a second of the board's link.
 pub const BAUD: u32 = 921_600;
@@ -68,28 +68,13 @@ impl Port {
     ///
     /// # Errors
     /// [`PortError::Lost`], also when the line does not take them by then.
-    pub fn write_until(&mut self, mut bytes: &[u8], deadline: &Deadline) -> Result<(), PortError> {
-        let deadline = deadline.at_most(WRITE_WAIT);
-        while !bytes.is_empty() {
-            match self.inner.write(bytes) {
-                Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
-                Err(error) if is_short_wait(&error) => {}
-                Err(error) => return Err(self.lost(&error.to_string())),
-            }
-            if !bytes.is_empty() && deadline.check().is_err() {
-                return Err(self.lost("it takes no bytes"));
-            }
-        }
-        Ok(())
+    pub fn write_until(&mut self, bytes: &[u8], deadline: &Deadline) -> Result<(), PortError> {
+        write_before(&deadline.at_most(WRITE_WAIT), &mut self.inner, bytes).map_err(|error| self.lost(&error.to_string()))
     }
 
     fn lost(&self, reason: &str) -> PortError {
         PortError::Lost { name: self.name.clone(), reason: reason.to_owned() }
     }
-}
-
-fn is_short_wait(error: &std::io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock)
 }
 
 fn absent(name: &str) -> PortError {

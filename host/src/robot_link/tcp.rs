@@ -1,13 +1,13 @@
 //! A TCP connection that is read in short waits. Answers have a deadline for all of their bytes, and lines a bound.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::Read;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
 use super::LinkError;
-use crate::deadline::{Deadline, StopFlag, WaitOver};
+use crate::deadline::{Deadline, StopFlag, WaitOver, is_short_wait, write_before};
 
 /// How long one read or write waits before it says that nothing came or went.
 const READ_WAIT: Duration = Duration::from_millis(2);
@@ -98,19 +98,9 @@ impl Tcp {
     ///
     /// # Errors
     /// [`LinkError::Lost`], also when the other end does not take them within a second.
-    pub(super) fn write_all(&mut self, mut bytes: &[u8]) -> Result<(), LinkError> {
+    pub(super) fn write_all(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
         let deadline = Deadline::regardless(WRITE_WAIT);
-        while !bytes.is_empty() {
-            match self.stream.write(bytes) {
-                Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
-                Err(error) if is_short_wait(&error) => {}
-                Err(error) => return Err(self.lost(&error.to_string())),
-            }
-            if !bytes.is_empty() && deadline.check().is_err() {
-                return Err(self.lost("it takes no bytes"));
-            }
-        }
-        Ok(())
+        write_before(&deadline, &mut self.stream, bytes).map_err(|error| self.lost(&error.to_string()))
     }
 
     /// Reads away what nobody needs, so that the other end is not held up. At most `limit` bytes, and no longer than a moment.
@@ -194,8 +184,4 @@ fn first_stream(address: &str, wait: Duration) -> Result<TcpStream, String> {
         }
     }
     Err(reason)
-}
-
-fn is_short_wait(error: &std::io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock)
 }
