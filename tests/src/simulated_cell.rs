@@ -10,7 +10,7 @@ use host_cal::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Ended, Guide, Ledger, Nearness, Operator, RowState, Summary,
 };
 use host_cal::files::{PairingId, PlanRow, Rig, Robot, Source, read_plan, write_plan};
-use host_cal::plan::{Cell, Grid, Margins, Pace as PlanPace, PlanOptions, plan};
+use host_cal::plan::{Cell, CheckedPlan, Grid, Margins, Pace as PlanPace, PlanOptions, plan};
 use host_cal::robot_link::RobotLink;
 use host_cal::robot_link::sim::{SimHand, SimLink};
 use host_cal::session::{Recorder, Run, SessionLock};
@@ -195,10 +195,11 @@ impl<Board> SimulatedCell<Board> {
         let run = Run::beginning("port", board.hello(), 200);
         let lock = SessionLock::acquire(&self.path(session)).expect("nobody else writes");
         let recorder = Recorder::begin(&lock, run, Some(robot.kinds())).expect("the session can be written");
-        let ledger = Ledger::new(&rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
+        let plan = CheckedPlan::new(&cell, &rows).expect("a plan that leads into nothing");
+        let ledger = Ledger::new(plan, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let criteria = StillnessCriteria { hold_us: 200_000, ..StillnessCriteria::default() };
         let board = BoardWatch::begin(board, robot, recorder, 200, criteria).expect("the board streams");
-        let mut collector = Collector::new(&cell, ledger, board, operator, options);
+        let mut collector = Collector::new(ledger, board, operator, options);
         let near = Nearness { turn_rad: 2_f64.to_radians(), slide_m: 2e-3 };
         let ended = match link {
             Some(link) => collector.drive(link),

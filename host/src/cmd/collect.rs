@@ -25,8 +25,7 @@ use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, ProgramOptions, TrackOptions, check_board,
     remove_lag,
 };
-use crate::files::PlanRow;
-use crate::plan::{Cell, Margins, Pace, check};
+use crate::plan::{Cell, CheckedPlan, Margins, Pace, UnsafePlan};
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run, SessionLock};
@@ -118,30 +117,12 @@ enum ArgumentError {
     #[error("--continuous needs a robot link that this program moves the robot by")]
     #[diagnostic(help("With manual and file every pose is measured standing."))]
     ContinuousByHand,
-    #[error("the plan has {what}")]
+    #[error("the plan has {0}")]
     #[diagnostic(help("Nothing was moved. `host-cal plan --check` says more; plan again, or correct the rig's [solids]."))]
-    UnsafePlan { what: String },
+    UnsafePlan(UnsafePlan),
     #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
     #[diagnostic(help("Tell it the robot first: host-cal apply PORT --robot robot.toml --uncalibrated"))]
     NoParameters,
-}
-
-/// Nothing is moved along a plan that leads into something, whoever wrote or edited it.
-fn check_plan(cell: &Cell<'_>, rows: &[PlanRow]) -> Result<(), ArgumentError> {
-    /// Of a joint, radians or metres.
-    const STEP: f64 = 0.02;
-    let found = check(cell, rows, STEP, 0, 0, &|_| ());
-    let what = if found.limit_rad < 0.0 || found.limit_m < 0.0 {
-        "a joint beyond its limits".to_owned()
-    } else if found.travel_m < 0.0 {
-        "the bar beyond its travel".to_owned()
-    } else if found.clearance_m < 0.0 {
-        let line = rows.get(found.nearest_row).map_or(0, |row| row.line);
-        format!("{} in one another, on the way to line {line}", found.nearest)
-    } else {
-        return Ok(());
-    };
-    Err(ArgumentError::UnsafePlan { what })
 }
 
 impl CollectArgs {
@@ -150,13 +131,13 @@ impl CollectArgs {
         let files = SessionFiles::open(&self.session, self.plan.as_deref(), self.robot.as_deref(), self.rig.as_deref())?;
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
         let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default())?;
-        check_plan(&cell, &files.rows)?;
+        let plan = CheckedPlan::new(&cell, &files.rows).map_err(ArgumentError::UnsafePlan)?;
 
         let mut mover = self.mover.open(files.robot.chain.joint_kinds())?;
         if self.continuous && !matches!(mover, Mover::Link(_)) {
             return Err(ArgumentError::ContinuousByHand.into());
         }
-        let programs = self.programs(&mover, &files, &options)?;
+        let programs = self.programs(&mover, &plan, &options)?;
         let mut link = self.port.connect()?;
         let robot = RobotOnBoard::read(&mut link)?.ok_or(ArgumentError::NoParameters)?;
         if let Answer::Status(status) = link.request(Command::Status)? {
@@ -173,7 +154,7 @@ impl CollectArgs {
         };
         let recorder = self.recorder(&lock, &link, &robot, &mover)?;
         let recovered = recorder.recovered();
-        let ledger = Ledger::new(&files.rows, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
+        let ledger = Ledger::new(plan, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let mut board =
             BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
 
@@ -185,7 +166,7 @@ impl CollectArgs {
         hand.heed(end.stop_flag());
         let mut terminal = Terminal::new(hand, Still::new(head, &files.robot), end);
         let began = Instant::now();
-        let mut collector = Collector::new(&cell, ledger, board, &mut terminal, options);
+        let mut collector = Collector::new(ledger, board, &mut terminal, options);
         let ended = match &mut mover {
             Mover::Link(link) => collector.drive(link.as_mut()),
             Mover::Programs(_) | Mover::Hand => collector.follow(self.nearness(), &guide),
@@ -235,10 +216,15 @@ impl CollectArgs {
     }
 
     /// For a robot that a program of its controller moves.
-    fn programs(&self, mover: &Mover, files: &SessionFiles, options: &CollectOptions) -> Result<Option<Programs>, CommandError> {
+    fn programs(
+        &self,
+        mover: &Mover,
+        plan: &CheckedPlan<'_>,
+        options: &CollectOptions,
+    ) -> Result<Option<Programs>, CommandError> {
         let Mover::Programs(dialect) = mover else { return Ok(None) };
         let options = ProgramOptions { speed: options.speed, stand_s: self.stand_s, setup: self.mover.setup() };
-        Ok(Some(Programs::of_plan(files, *dialect, &options)?))
+        Ok(Some(Programs::of_plan(plan, *dialect, &options)?))
     }
 
     fn hand(&self) -> Result<Hand, CommandError> {

@@ -135,18 +135,12 @@ const TELL: Duration = Duration::from_millis(100);
 
 impl<'a, 'o> Collector<'a, 'o> {
     /// At a plan, of which some may be done, with a board that streams.
-    pub fn new(
-        cell: &'a Cell<'a>,
-        ledger: Ledger<'a>,
-        board: BoardWatch,
-        operator: &'o mut dyn Operator,
-        options: CollectOptions,
-    ) -> Self {
+    pub fn new(ledger: Ledger<'a>, board: BoardWatch, operator: &'o mut dyn Operator, options: CollectOptions) -> Self {
         let (began, summary) = (Instant::now(), Summary::default());
         let (bar, since_us, missed_in_a_row) = (Bar::Unknown, 0, 0);
         let (stands, wishes) = (HashMap::new(), VecDeque::new());
         Self {
-            cell,
+            cell: ledger.cell(),
             ledger,
             board,
             operator,

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use crate::files::{PairingId, PlanRow, RowKind};
+use crate::plan::{Cell, CheckedPlan};
 
 /// What became of a row so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,7 +23,7 @@ pub enum RowState {
 /// A plan and what is done of it.
 #[derive(Clone, Debug)]
 pub struct Ledger<'a> {
-    rows: &'a [PlanRow],
+    plan: CheckedPlan<'a>,
     states: Vec<RowState>,
 }
 
@@ -31,7 +32,7 @@ pub(super) type Joined = (PairingId, f64);
 
 impl<'a> Ledger<'a> {
     /// A plan of which the rows of these lines of plan.csv are measured, and those skipped.
-    pub fn new(rows: &'a [PlanRow], measured: impl Iterator<Item = usize>, skipped: impl Iterator<Item = usize>) -> Self {
+    pub fn new(plan: CheckedPlan<'a>, measured: impl Iterator<Item = usize>, skipped: impl Iterator<Item = usize>) -> Self {
         let (measured, skipped): (HashSet<usize>, HashSet<usize>) = (measured.collect(), skipped.collect());
         let state = |row: &PlanRow| match row.kind {
             RowKind::Via => RowState::Via,
@@ -39,12 +40,17 @@ impl<'a> Ledger<'a> {
             RowKind::Measure if skipped.contains(&row.line) => RowState::Skipped,
             RowKind::Measure => RowState::Todo,
         };
-        Self { rows, states: rows.iter().map(state).collect() }
+        Self { plan, states: plan.rows().iter().map(state).collect() }
+    }
+
+    /// The robot at its rig, for which the plan was checked.
+    pub fn cell(&self) -> &'a Cell<'a> {
+        self.plan.cell()
     }
 
     /// The rows.
     pub fn rows(&self) -> &'a [PlanRow] {
-        self.rows
+        self.plan.rows()
     }
 
     /// What became of a row.
@@ -61,7 +67,7 @@ impl<'a> Ledger<'a> {
 
     /// The row of a line of plan.csv.
     pub fn row_of_line(&self, line: usize) -> Option<usize> {
-        self.rows.iter().position(|row| row.line == line)
+        self.rows().iter().position(|row| row.line == line)
     }
 
     /// The row to measure next for an arm at row `here`: on its shell ahead, or else behind; then that of another shell that comes
@@ -81,16 +87,16 @@ impl<'a> Ledger<'a> {
 
     /// Rows of one connection around a row, those without the bar before them among these.
     pub fn shell_of(&self, row: usize) -> std::ops::Range<usize> {
-        let joined = joined(&self.rows[row]);
+        let joined = joined(&self.rows()[row]);
         let is_other = |other: &PlanRow| self::joined(other) != joined;
-        let start = self.rows[..row].iter().rposition(is_other).map_or(0, |last| last + 1);
-        let end = self.rows[row..].iter().position(is_other).map_or(self.rows.len(), |first| row + first);
+        let start = self.rows()[..row].iter().rposition(is_other).map_or(0, |last| last + 1);
+        let end = self.rows()[row..].iter().position(is_other).map_or(self.rows().len(), |first| row + first);
         start..end
     }
 
     /// Whether the bar stays on between two neighbouring rows, and where.
     pub fn stays_on(&self, a: usize, b: usize) -> Option<Joined> {
-        let (a, b) = (&self.rows[a], &self.rows[b]);
+        let (a, b) = (&self.rows()[a], &self.rows()[b]);
         (a.bar.is_some() && b.bar.is_some() && joined(a) == joined(b)).then_some(joined(a))
     }
 
@@ -106,7 +112,7 @@ impl<'a> Ledger<'a> {
 
     /// Lines of plan.csv that could not be measured, and why.
     pub fn missed(&self) -> Vec<(usize, String)> {
-        let missed = self.rows.iter().zip(&self.states).filter_map(|(row, state)| match state {
+        let missed = self.rows().iter().zip(&self.states).filter_map(|(row, state)| match state {
             RowState::Missed(why) => Some((row.line, why.clone())),
             _ => None,
         });

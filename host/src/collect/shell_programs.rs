@@ -1,9 +1,8 @@
 //! A plan as programs of a controller: for each shell one that brings the robot there, without the bar, and one that measures.
 
-use ballbar::JointKind;
-
 use super::ledger::shells;
-use crate::files::{PlanRow, Rig, RowKind};
+use crate::files::{PlanRow, RowKind};
+use crate::plan::CheckedPlan;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::program::{ControllerSetup, Program, ProgramStep};
 use crate::session::Connection;
@@ -29,7 +28,8 @@ pub struct ShellProgram {
 }
 
 /// The programs of all shells of a plan, in its order. Each begins where the one before it ends.
-pub fn plan_programs(rows: &[PlanRow], rig: &Rig, kinds: &[JointKind], options: &ProgramOptions) -> Vec<ShellProgram> {
+pub fn plan_programs(plan: &CheckedPlan<'_>, options: &ProgramOptions) -> Vec<ShellProgram> {
+    let (rows, rig, kinds) = (plan.rows(), plan.cell().rig, plan.cell().robot.chain.joint_kinds());
     let program = |name: String, steps, before, after| {
         let ProgramOptions { speed, stand_s, setup } = options.clone();
         Program { name, kinds: kinds.to_vec(), steps, speed, stand_s, before, after, setup }

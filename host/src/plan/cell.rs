@@ -6,7 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::contact::Nearest;
-use super::scene::{FixturesOverlap, Scene};
+use super::fixtures::FixturesOverlap;
+use super::scene::Scene;
 use crate::files::{PairingId, Rig, Robot};
 use crate::identify::plausible_error;
 use crate::kinematics::{InverseKinematics, Posture};

@@ -23,10 +23,12 @@ pub enum Contact {
     LinkChucks(usize),
     /// Two links.
     Links(usize, usize),
-    /// The plate with the spheres, and table or chucks.
+    /// The plate with the spheres, or one of them, and table or chucks.
     ToolTable,
     /// The plate with the spheres, and a link.
     ToolLink(usize),
+    /// A sphere and a link.
+    SphereLink(usize),
 }
 
 impl fmt::Display for Contact {
@@ -43,6 +45,7 @@ impl fmt::Display for Contact {
             Self::Links(a, b) => write!(f, "link {a} near link {b}"),
             Self::ToolTable => f.write_str("tool near table or chucks"),
             Self::ToolLink(link) => write!(f, "tool near link {link}"),
+            Self::SphereLink(link) => write!(f, "sphere near link {link}"),
         }
     }
 }

@@ -8,12 +8,15 @@
 //!
 //! `docs/planning.md` says how each choice is made and why.
 
+mod bodies;
 mod cell;
 mod check;
+mod checked;
 mod choice;
 mod contact;
 mod cores;
 mod experience;
+mod fixtures;
 mod geometry;
 mod grid;
 mod growth;
@@ -24,20 +27,25 @@ mod planner;
 mod posture;
 mod progress;
 mod quality;
+mod remedy;
 mod scene;
 mod shell;
+mod swing;
 mod transfer;
 mod way;
 
 pub use cell::{Cell, LimitMargin, Margins, Pace, RESERVED_DEVIATIONS, plausible_deviation};
 pub use check::{Found as CheckFound, check};
+pub use checked::{CheckedPlan, UnsafePlan};
 pub use contact::{Contact, Nearest};
-pub use geometry::{Disc, Segment};
+pub use fixtures::FixturesOverlap;
+pub use geometry::{Core, Disc, Segment};
 pub use grid::{Crossing, Grid};
 pub use optimal::d_optimal;
 pub use planner::{Comparison, Plan, PlanError, PlanOptions, ShellSummary, plan};
 pub use posture::Hindrance;
 pub use progress::{Progress, Stage, Tell};
 pub use quality::{Expectation, Quality, Unfit};
-pub use scene::{FixturesOverlap, Scene};
+pub use scene::Scene;
+pub use swing::Swing;
 pub use transfer::way_between;

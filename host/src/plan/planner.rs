@@ -11,13 +11,14 @@ use thiserror::Error;
 use super::cell::{Cell, Margins, Pace};
 use super::choice::{in_one_piece, most_telling};
 use super::cores::on_all_cores;
+use super::fixtures::FixturesOverlap;
 use super::grid::Grid;
 use super::growth::{FAMILIES, Wanted, families};
 use super::optimal::d_optimal;
 use super::posture::{Hindrance, Shell};
 use super::progress::{Ongoing, Stage, Tell};
 use super::quality::{Expectation, Quality, Unfit};
-use super::scene::FixturesOverlap;
+use super::remedy::{reasons, remedy};
 use super::shell::{ShellRoads, Stop, TOURS};
 use super::transfer;
 use crate::files::{Dataset, PairingId, PlanRow, PoseRow, Rig, Robot, RowKind, RowMargins};
@@ -55,10 +56,7 @@ pub enum PlanError {
     Overlap(#[from] FixturesOverlap),
     /// No point of a shell can be measured.
     #[error("pairing {pairing}, bar {bar_mm} mm: none of {points} points can be measured: {why}")]
-    #[diagnostic(help(
-        "Move the chucks nearer to the robot or away from its foot, take another bar length with --bar, ask for smaller margins, or \
-         give the true sizes of links and fixtures in the rig's [solids] table."
-    ))]
+    #[diagnostic(help("{remedy}"))]
     OutOfReach {
         /// `chuck:sphere`.
         pairing: String,
@@ -68,6 +66,8 @@ pub enum PlanError {
         points: usize,
         /// What hindered, with counts.
         why: String,
+        /// What to change.
+        remedy: String,
     },
     /// More poses are to be chosen than there are.
     #[error("--optimal {wanted}: only {found} poses were found to choose from")]
@@ -230,12 +230,12 @@ fn all_tours(cell: &Cell<'_>, roads: &mut [ShellRoads], chosen: &[Vec<usize>], t
 }
 
 fn out_of_reach(cell: &Cell<'_>, road: &ShellRoads) -> PlanError {
-    let why: Vec<String> = road.hindrance_counts().iter().map(|(hindrance, count)| format!("{hindrance} {count}")).collect();
     PlanError::OutOfReach {
         pairing: cell.rig.pairing_name(road.shell.id),
         bar_mm: tidy(mm_from_m(road.shell.bar_m)),
         points: road.crossings.len(),
-        why: why.join(", "),
+        why: reasons(road),
+        remedy: remedy(cell, road),
     }
 }
 

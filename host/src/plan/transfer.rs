@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cell::Cell;
 use super::posture::Shell;
+use super::swing::Swing;
 use super::way::{self, is_clear, is_sound};
 use crate::files::PairingId;
 
@@ -137,7 +138,7 @@ impl Tree {
         let whole = (BRANCH_S / cell.seconds(&from, towards)).min(1.0);
         let tip = [1.0, 0.5, 0.25, 0.125].into_iter().find_map(|part| {
             let tip = if whole * part < 1.0 { along(&from, towards, whole * part) } else { *towards };
-            (is_sound(cell, None, &tip, 0.0) && is_clear(cell, None, &from, &tip)).then_some(tip)
+            (is_sound(cell, None, &tip, &Swing::NONE) && is_clear(cell, None, &from, &tip)).then_some(tip)
         })?;
         self.nodes.push((tip, Some(nearest)));
         Some(self.nodes.len() - 1)

@@ -8,6 +8,7 @@ use ballbar::JointVector;
 
 use super::cell::{Cell, halfway};
 use super::posture::Shell;
+use super::swing::Swing;
 
 /// Halvings of a way at most: up to 63 via points.
 const DEEPEST: usize = 6;
@@ -43,7 +44,8 @@ fn bisect(
     if depth == 0 || cell.longest_motion_m(a, b) < FINEST_MOTION_M {
         return false;
     }
-    let Some(middle) = onto_shell(cell, shell, halfway(a, b)).filter(|middle| is_sound(cell, Some(shell), middle, 0.0)) else {
+    let Some(middle) = onto_shell(cell, shell, halfway(a, b)).filter(|middle| is_sound(cell, Some(shell), middle, &Swing::NONE))
+    else {
         return false;
     };
     bisect(cell, shell, a, &middle, depth - 1, vias) && {
@@ -54,28 +56,28 @@ fn bisect(
 
 /// Whether the joint-interpolated way between two sound joint vectors keeps all margins, with the bar on a shell or without it.
 ///
-/// Looks at the middle: where what is free there exceeds all motion that is left to either end, the piece is clear for certain.
+/// Looks at the middle: where what is free there exceeds the motion that is left to either end, the piece is clear for certain.
 pub(super) fn is_clear(cell: &Cell<'_>, attached: Option<&Shell>, a: &JointVector<f64>, b: &JointVector<f64>) -> bool {
     let middle = halfway(a, b);
-    let motion_m = cell.longest_motion_m(a, &middle);
+    let swing = Swing::between(cell.inverse.skeleton(), a, &middle);
     let largest_step = a.as_array().iter().zip(middle.as_array()).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let is_fine = attached.is_none() || 2.0 * largest_step <= COARSEST_STEP;
-    if is_fine && is_sound(cell, attached, &middle, motion_m) {
+    if is_fine && is_sound(cell, attached, &middle, &swing) {
         return true;
     }
-    if motion_m < FINEST_MOTION_M || !is_sound(cell, attached, &middle, 0.0) {
+    if cell.longest_motion_m(a, &middle) < FINEST_MOTION_M || !is_sound(cell, attached, &middle, &Swing::NONE) {
         return false;
     }
     is_clear(cell, attached, a, &middle) && is_clear(cell, attached, &middle, b)
 }
 
-/// Whether a joint vector keeps the margins of a way, and beyond the clearance `spare_m` of room.
-pub(super) fn is_sound(cell: &Cell<'_>, attached: Option<&Shell>, q: &JointVector<f64>, spare_m: f64) -> bool {
+/// Whether a joint vector keeps the margins of a way, and those between solids for as long as the joints stay within `swing` of it.
+pub(super) fn is_sound(cell: &Cell<'_>, attached: Option<&Shell>, q: &JointVector<f64>, swing: &Swing) -> bool {
     let keeps_travel =
         |shell: &Shell| cell.travel_margin_m(q, &shell.pairing, shell.bar_m) >= cell.margins.travel_m + SAMPLING_GUARD_M;
     cell.keeps_limits(q)
         && attached.is_none_or(keeps_travel)
-        && cell.scene.is_apart(&cell.posture(q), attached.map(|shell| shell.id), cell.margins.clearance_m + spare_m)
+        && cell.scene.keeps_apart(&cell.posture(q), attached.map(|shell| shell.id), cell.margins.clearance_m, swing)
 }
 
 /// The joint vector nearest to `q`, to first order, at which the bar is at mid travel.

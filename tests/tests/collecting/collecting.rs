@@ -19,6 +19,11 @@ fn cell() -> SimulatedCell {
     SimulatedCell::start(plant(3), SIGMA_M, &SHORT_PLAN)
 }
 
+/// How many poses the short plan has.
+fn planned() -> usize {
+    SHORT_PLAN.lines().filter(|line| line.starts_with("measure,")).count()
+}
+
 fn measured_lines(cell: &SimulatedCell, session: &str) -> Vec<String> {
     column(&cell.path(session), "plan_row")
 }
@@ -29,7 +34,7 @@ fn a_plan_is_walked_to_its_end_without_a_hand_on_it() {
     let run = cell.collect("session", &["--json", "--temperature-c", "21.5"]);
     assert_eq!(run.code, 0, "{}", run.transcript());
     let report = run.json();
-    assert_eq!((&report["status"], &report["measured"], &report["left"]), (&"done".into(), &24.into(), &0.into()));
+    assert_eq!((&report["status"], &report["measured"], &report["left"]), (&"done".into(), &planned().into(), &0.into()));
     assert_eq!(report["losses"]["missing"], 0);
     assert!(report["repeats"].as_array().unwrap().iter().all(|repeat| repeat["difference_mm"].as_f64().unwrap().abs() < 1.0));
     cell.assert_all_measured("session");
@@ -41,8 +46,8 @@ fn a_plan_is_walked_to_its_end_without_a_hand_on_it() {
 
     // The session alone is enough for the others.
     let rank = cell.host_cal(&["rank", "session", "--json"]);
-    assert_eq!(rank.json()["rank"], 24, "{}", rank.transcript());
-    assert_eq!(column(&cell.path("session"), "bar_mm"), vec!["460"; 24]);
+    assert_eq!(rank.json()["rank"], planned(), "{}", rank.transcript());
+    assert_eq!(column(&cell.path("session"), "bar_mm"), vec!["460"; planned()]);
 
     // There is nothing left to do.
     let run = cell.collect("session", &["--json"]);
@@ -134,7 +139,7 @@ fn poses_can_be_erased_skipped_and_waited_with() {
     let mut lines = measured_lines(&cell, "session");
     lines.sort();
     lines.dedup();
-    assert_eq!(lines.len(), 23, "what was skipped stays so");
+    assert_eq!(lines.len(), planned() - 1, "what was skipped stays so");
 }
 
 #[test]

@@ -60,10 +60,12 @@ fn numbers(cell: &SimulatedCell, name: &str) -> Vec<Option<f64>> {
 }
 
 /// At 20 deg/s, by which the way takes about as long as stopping at every pose with 30, there are ten times the poses, and the robot is
-/// found twice as well; the lag is told apart from all parameters, and lengths without it fit better.
+/// found better; the lag is told apart from all parameters, and lengths without it fit better. (The tool's RMS error over nine plans: 1.25 mm
+/// by stopping, 0.78 mm on the way. Plans of three pairings alone go either way, since these errors follow one another along a way.)
 #[test]
 fn a_robot_is_measured_on_the_way_in_the_time_of_stopping_and_better() {
-    let plan = plan_text(30, &[0.46], &[(0, 0), (1, 1), (2, 2)]);
+    let pairings: Vec<(usize, usize)> = (0..3).flat_map(|chuck| (0..3).map(move |sphere| (chuck, sphere))).collect();
+    let plan = plan_text(12, &[0.46], &pairings);
     let stopping = collect(&plan, STANDING_S, &[]);
     let moving = collect(&plan, 0.0, &["--continuous", "--slow-deg-s", "20"]);
     let (stopped, moved) = (fitted(&stopping.poses), fitted(&moving.poses));

@@ -3,9 +3,10 @@
 #![cfg(unix)]
 
 use ballbar::{JointKind, JointVector};
-use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, design, plant, rig};
+use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, TRAVEL_M, design, plant, rig};
 use host_cal::collect::{ProgramOptions, plan_programs};
-use host_cal::files::{Source, read_plan};
+use host_cal::files::{Rig, Robot, Source, read_plan};
+use host_cal::plan::{Cell, CheckedPlan, Margins, Pace};
 use host_cal::robot_link::JointSpeed;
 use host_cal::robot_link::program::{
     ControllerSetup, Dialect, Program, ProgramError, ProgramFile, ProgramStep, START_TOLERANCE_DEG, START_TOLERANCE_MM,
@@ -250,13 +251,18 @@ fn tools_are_the_controllers() {
     }
 }
 
+fn cell_of<'a>(robot: &'a Robot, rig: &'a Rig) -> Cell<'a> {
+    Cell::new(robot, rig, TRAVEL_M, Margins::default(), Pace::default()).unwrap()
+}
+
 #[test]
 fn the_programs_of_a_plan_can_all_be_loaded() {
     let (robot, rig) = (design(), rig());
     let rows = read_plan(&Source::new("plan.csv", &SHORT_PLAN), &robot, &rig).unwrap();
     let setup = ControllerSetup { j23: Some(-1), ..ControllerSetup::default() };
     let options = ProgramOptions { speed: JointSpeed::default(), stand_s: 3.0, setup };
-    let shells = plan_programs(&rows, &rig, robot.chain.joint_kinds(), &options);
+    let cell = cell_of(&robot, &rig);
+    let shells = plan_programs(&CheckedPlan::new(&cell, &rows).unwrap(), &options);
     assert_eq!(shells.len(), 3);
     // One begins where another ends, the first one at the plan's first row.
     let programs: Vec<&Program> = shells.iter().flat_map(|shell| [&shell.approach, &shell.measure]).collect();
@@ -311,6 +317,8 @@ fn collect_writes_programs_that_do_what_they_should() {
     };
     let (robot, rig) = (design(), rig());
     let rows = read_plan(&Source::new("plan.csv", &SHORT_PLAN), &robot, &rig).unwrap();
+    let cell = cell_of(&robot, &rig);
+    let plan = CheckedPlan::new(&cell, &rows).unwrap();
     for (dialect, more, fastest_deg_s) in [
         (Dialect::Val, &["--robot-fastest-deg-s", "300"][..], 300.0),
         (Dialect::Krl, &["--robot-tool", "7", "--robot-fastest-deg-s", "250"], 250.0),
@@ -324,7 +332,7 @@ fn collect_writes_programs_that_do_what_they_should() {
         let setup = ControllerSetup { tool, fastest_rad_s, j23: Some(-1) };
         let speed = JointSpeed { revolute_rad_s: 30_f64.to_radians(), prismatic_m_s: 0.1 };
         let options = ProgramOptions { speed, stand_s: 3.0, setup };
-        let shells = plan_programs(&rows, &rig, robot.chain.joint_kinds(), &options);
+        let shells = plan_programs(&plan, &options);
         let programs: Vec<&Program> = shells.iter().flat_map(|shell| [&shell.approach, &shell.measure]).collect();
         assert_eq!(files.len(), programs.len(), "{dialect}");
         for program in programs {

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::session_files::SessionFiles;
 use crate::cmd::outcome::CommandError;
 use crate::cmd::report::{make_folder, write_session_file};
 use crate::collect::{ProgramOptions, ShellPrograms, plan_programs};
+use crate::plan::CheckedPlan;
 use crate::robot_link::program::{Dialect, Program, ProgramError, ProgramFile, write_program};
 use crate::session::PROGRAMS_NAME;
 
@@ -17,7 +17,7 @@ pub(super) struct Programs {
 }
 
 impl Programs {
-    pub(super) fn of_plan(plan: &SessionFiles, dialect: Dialect, options: &ProgramOptions) -> Result<Self, ProgramError> {
+    pub(super) fn of_plan(plan: &CheckedPlan<'_>, dialect: Dialect, options: &ProgramOptions) -> Result<Self, ProgramError> {
         let mut files = Vec::new();
         let mut text = |program: &Program| -> Result<String, ProgramError> {
             let written = write_program(dialect, program)?;
@@ -26,7 +26,7 @@ impl Programs {
             Ok(first)
         };
         let mut names = Vec::new();
-        for shell in plan_programs(&plan.rows, &plan.rig, plan.robot.chain.joint_kinds(), options) {
+        for shell in plan_programs(plan, options) {
             names.push(ShellPrograms { approach: text(&shell.approach)?, measure: text(&shell.measure)? });
         }
         Ok(Self { names, files })
