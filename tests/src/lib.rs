@@ -18,6 +18,7 @@ pub mod fake_hardware;
 pub mod naive;
 pub mod parameter_sets;
 pub mod peers;
+pub mod plans;
 pub mod power_cut;
 pub mod raw_payload;
 pub mod readers;

@@ -7,7 +7,7 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use super::geometry::Disc;
-use super::scene::{Gap, Scene, Thing, What};
+use super::scene::{CONSTANT_M, Gap, Scene, Thing, What};
 use crate::files::Rig;
 use crate::kinematics::Posture;
 use crate::units::mm_from_m;
@@ -98,8 +98,9 @@ pub(super) fn check_fixtures(
         if !matches!(link.what, What::Link(_)) || !is_on_tool {
             continue;
         }
-        // Where motion changes nothing, what is not within one another has to do.
-        let wanted_m = if gap.has_constant_part() { 0.0 } else { clearance_m };
+        // Where motion changes nothing, what is not within one another has to do; a last link that is flush with the plate is fitted some
+        // micrometres into it.
+        let wanted_m = if gap.has_constant_part() { -CONSTANT_M } else { clearance_m };
         part(&name(link, rig), &name(tool, rig), gap.whole.most_m, wanted_m, true)
             .map_err(|overlap| FixturesOverlap { turned: TurnedPlate::of(scene, home), ..overlap })?;
     }

@@ -8,7 +8,7 @@ mod bar;
 mod gaps;
 
 use self::bar::BarEnds;
-pub(super) use self::gaps::Gap;
+pub(super) use self::gaps::{CONSTANT_M, Gap};
 use self::gaps::{End, Pair, candidates};
 use super::bodies::{Body, bodies};
 use super::contact::{Contact, Nearest};

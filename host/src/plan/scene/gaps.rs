@@ -54,7 +54,7 @@ pub(in crate::plan) struct Gap {
 }
 
 /// A gap that differs by less, from posture to posture, is one that motion cannot change.
-const CONSTANT_M: f64 = 0.005;
+pub(in crate::plan) const CONSTANT_M: f64 = 0.005;
 
 /// From the least to the most.
 #[derive(Clone, Copy, Debug)]
