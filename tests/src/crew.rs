@@ -21,6 +21,8 @@ pub struct Crew {
     wrong: usize,
     /// How often it is left on when it should come off.
     left_on: usize,
+    /// Whether somebody looks at the robot and confirms.
+    is_looking: bool,
     /// All that it was told.
     pub told: Vec<String>,
 }
@@ -29,7 +31,7 @@ impl Crew {
     /// Does as it is asked.
     pub fn new(cell: &SimulatedCell) -> Self {
         let (wishes, told) = (VecDeque::new(), Vec::new());
-        Self { hand: cell.hand(), is_done: false, measured: 0, wishes, wrong: 0, left_on: 0, told }
+        Self { hand: cell.hand(), is_done: false, measured: 0, wishes, wrong: 0, left_on: 0, is_looking: false, told }
     }
 
     /// With wishes, and how many poses are measured when they come.
@@ -47,6 +49,12 @@ impl Crew {
     #[must_use]
     pub fn left_on(self, times: usize) -> Self {
         Self { left_on: times, ..self }
+    }
+
+    /// Looks at the robot when it is asked to, and confirms.
+    #[must_use]
+    pub fn looking(self) -> Self {
+        Self { is_looking: true, ..self }
     }
 
     fn attach(&mut self, bar: &Connection) -> Result<(), LinkError> {
@@ -72,12 +80,17 @@ impl Operator for Crew {
                 }
                 self.is_done = true;
             }
+            Event::Inspect { .. } => self.is_done = self.is_looking,
             Event::Measured(_) => self.measured += 1,
             Event::Now(_) => return Ok(()),
             _ => {}
         }
         self.told.push(format!("{event:?}"));
         Ok(())
+    }
+
+    fn is_present(&self) -> bool {
+        self.is_looking
     }
 
     fn wish(&mut self) -> Option<Wish> {

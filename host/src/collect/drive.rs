@@ -62,6 +62,9 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
 
     fn walk(&mut self) -> Result<Ended, CollectError> {
         let Some(first) = self.collector.ledger.first() else { return Ok(Ended::Done) };
+        if self.attend()? {
+            return Ok(Ended::Quit);
+        }
         let Some(mut here) = self.find_place(first)? else { return Ok(Ended::Quit) };
         let mut repeated = None;
         loop {
@@ -158,8 +161,10 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
                 }
             }
             if attempt < RETRIES {
+                if self.recover()? {
+                    return Ok(Step::Quit);
+                }
                 self.collector.trouble(format!("on the way to line {line}: {words}; trying again"))?;
-                self.robot.recover()?;
             }
         }
         if times_off > RETRIES { Err(CollectError::BarOff { line }) } else { Ok(Step::Blocked(words)) }
@@ -201,7 +206,9 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
         let line = self.collector.ledger.rows()[blocked].line;
         self.collector.trouble(format!("line {line} cannot be reached: {why}"))?;
         self.collector.miss(blocked, why)?;
-        self.robot.recover()?;
+        if self.recover()? {
+            return Ok(None);
+        }
         let shell = self.collector.ledger.shell_of(here);
         let behind: Vec<usize> =
             if target > here { (blocked + 1..shell.end).collect() } else { (shell.start..blocked).rev().collect() };
@@ -218,8 +225,8 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
             match self.go_clear(stays_on, &q, row)? {
                 Clear::Arrived => return Ok(Some(row)),
                 Clear::Quit => return Ok(None),
-                Clear::NoWay => {}
-                Clear::Failed(_) => self.robot.recover()?,
+                Clear::Failed(_) if self.recover()? => return Ok(None),
+                Clear::NoWay | Clear::Failed(_) => {}
             }
         }
         Err(CollectError::Blocked { line, why: why.to_owned() })
@@ -229,12 +236,16 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
     fn go_clear(&mut self, joined: Option<Joined>, q: &JointVector<f64>, row: usize) -> Result<Clear, CollectError> {
         let mut ended = self.try_clear(joined, q, row)?;
         for _ in 0..RETRIES {
-            let is_as_before = joined.is_none_or(|joined| self.collector.bar == Bar::On(joined));
-            match &ended {
-                Clear::Failed(why) if is_as_before => self.collector.trouble(format!("{why}; trying again"))?,
-                _ => break,
+            let Clear::Failed(why) = &ended else { break };
+            let what = format!("{why}; trying again");
+            if self.recover()? {
+                return Ok(Clear::Quit);
             }
-            self.robot.recover()?;
+            // It may have come off on the way, or in somebody's hands.
+            if joined.is_some_and(|joined| self.collector.bar != Bar::On(joined)) {
+                break;
+            }
+            self.collector.trouble(what)?;
             ended = self.try_clear(joined, q, row)?;
         }
         Ok(ended)
@@ -321,7 +332,11 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
                 Rest::Never | Rest::BarOff => {}
             },
             Clear::Quit => return Ok(true),
-            Clear::NoWay | Clear::Failed(_) => self.robot.recover()?,
+            Clear::NoWay | Clear::Failed(_) => {
+                if self.recover()? {
+                    return Ok(true);
+                }
+            }
         }
         if self.collector.bar != Bar::On(joined) && self.collector.attach(joined)? {
             return Ok(true);

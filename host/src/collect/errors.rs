@@ -107,6 +107,17 @@ pub enum CollectError {
         /// How far.
         off: String,
     },
+    /// Only a person may let the robot move on, and nobody is there.
+    #[error("the robot stands {place}: {what}; nobody is there to look at it, so nothing was released")]
+    #[diagnostic(help("{remedy}. Then run the same command again, without --yes to be asked: what was measured is kept."))]
+    NobodyToLook {
+        /// `on the way to line 12 of the plan, at 10.00° …`.
+        place: String,
+        /// The controller's words.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// The bar does not stay on.
     #[error("line {line} of the plan: the bar came off or beyond its travel, again; the robot was stopped")]
     #[diagnostic(help("Look at the magnets and at the bar's travel there. Run the same command again to go on."))]

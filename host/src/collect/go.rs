@@ -8,6 +8,7 @@ use super::board_watch::View;
 use super::collector::Bar;
 use super::drive::{Drive, nearest_on_way};
 use super::errors::CollectError;
+use super::operator::Event;
 use super::track;
 use crate::robot_link::MoveState;
 use crate::units::ScreenUnit;
@@ -95,6 +96,7 @@ impl Drive<'_, '_, '_, '_> {
     /// Until the move is over.
     fn watch(&mut self, from: &View, q: &JointVector<f64>, row: usize) -> Result<Go, CollectError> {
         let mut polled = Instant::now();
+        let mut held = None;
         loop {
             self.collector.listen()?;
             if self.collector.wants_to_end() {
@@ -110,11 +112,24 @@ impl Drive<'_, '_, '_, '_> {
             }
             polled = Instant::now();
             match self.robot.poll()? {
-                MoveState::Moving => {}
+                MoveState::Moving => {
+                    if held.take().is_some() {
+                        self.collector.operator.tell(&Event::Trouble("the robot goes on"))?;
+                    }
+                }
+                // However long it takes: it is in somebody's hand.
+                MoveState::Held(what) => {
+                    if held.as_ref() != Some(&what) {
+                        self.collector.trouble(format!("the robot waits: {what}"))?;
+                        held = Some(what);
+                    }
+                }
                 MoveState::Reached => {
                     self.confirm_arrival(q, row)?;
                     return self.check_free_bar(from).map(|()| Go::Arrived);
                 }
+                // The row is not to blame for what only a person may see to.
+                MoveState::Refused(why) if self.robot.intervention()?.is_some() => return Ok(Go::Failed(why)),
                 MoveState::Refused(why) => return Ok(Go::Refused(why)),
                 MoveState::Fault(why) => return Ok(Go::Failed(why)),
                 MoveState::TimedOut(time) => {

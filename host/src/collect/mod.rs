@@ -18,6 +18,7 @@ mod drive;
 mod errors;
 mod follow;
 mod go;
+mod inspect;
 mod lag;
 mod ledger;
 mod now;

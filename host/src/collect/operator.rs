@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::robot_link::LinkError;
+use crate::robot_link::{Intervention, LinkError};
 use crate::session::Connection;
 
 /// What the operator wants, at any time.
@@ -48,6 +48,14 @@ pub enum Event<'a> {
     Attach(&'a Connection),
     /// Take this off, or whatever is on, and confirm.
     Detach(Option<&'a Connection>),
+    /// The robot stands, and does not move on before a person has looked and confirmed. Told only where somebody
+    /// [is present](Operator::is_present).
+    Inspect {
+        /// `on the way to line 12 of the plan, at 10.00° …`.
+        place: &'a str,
+        /// What has happened, and what to do.
+        needed: &'a Intervention,
+    },
     /// The bar that is attached is what the plan asks for.
     Attached(&'a Connection),
     /// Drive the robot near these joint values (revolute joints radians, prismatic ones metres).
@@ -86,11 +94,16 @@ pub trait Operator {
     /// [`LinkError`] when what attaches the bar is out of reach.
     fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError>;
 
+    /// Whether a person is there who can look at the robot. Without one no stop of its safety is released, and the run ends.
+    fn is_present(&self) -> bool {
+        false
+    }
+
     /// The next wish; does not wait for one.
     fn wish(&mut self) -> Option<Wish>;
 }
 
-/// Nobody is there: every request counts as carried out.
+/// Nobody is there: every request about the bar counts as carried out.
 #[derive(Debug, Default)]
 pub struct Unattended {
     asked: bool,

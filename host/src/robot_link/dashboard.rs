@@ -1,5 +1,8 @@
 //! The dashboard server of a Universal Robots controller: lines of text on port 29999.
 //!
+//! A controller that goes from local to remote control still refuses orders over the connections that it has, so every use makes one of
+//! its own ("please switch robot to Remote Control mode and reconnect to port 29999", a controller's own words).
+//!
 //! Source: Universal Robots, "Dashboard Server, port 29999", article 15690; the replies to `unlock protective stop` as UR's own
 //! client library has them.
 

@@ -5,7 +5,7 @@
 //!
 //! | module | holds |
 //! | --- | --- |
-//! | [`urscript`] | Universal Robots: URScript to move, RTDE to listen, the dashboard to recover |
+//! | [`urscript`] | Universal Robots: URScript to move, RTDE to listen, the dashboard to ask and, after a person has looked, to release |
 //! | [`val`] | Unimation PUMAs with VAL or VAL II: what an operator types at its terminal |
 //! | [`program`] | files for controllers that take no moves on line |
 
@@ -16,6 +16,7 @@ mod rtde;
 pub mod sim;
 mod speed;
 mod tcp;
+mod ur_script_port;
 pub mod urscript;
 pub mod val;
 mod val_monitor;
@@ -35,6 +36,9 @@ pub use speed::JointSpeed;
 pub enum MoveState {
     /// The robot is on its way.
     Moving,
+    /// The move is begun, and something that a person set holds it until that person lets it go on: a speed slider at 0, a paused
+    /// program. What.
+    Held(String),
     /// The robot is where it was sent.
     Reached,
     /// The controller did not begin the move: out of its limits, not understood. Its words.
@@ -82,6 +86,15 @@ pub enum LinkError {
     Stopped,
 }
 
+/// What a person has to see to before the robot may move again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Intervention {
+    /// What has happened, in the controller's words.
+    pub what: String,
+    /// What the person has to do before confirming: a sentence without its full stop.
+    pub remedy: &'static str,
+}
+
 /// A robot's controller. Joint vectors are encoder outputs as in robot.toml, radians or metres.
 pub trait RobotLink {
     /// Kind and address, for people and for the session: `urscript at 192.168.1.10`.
@@ -113,11 +126,29 @@ pub trait RobotLink {
     fn stop(&mut self) -> Result<(), LinkError>;
 
     /// Makes the controller ready for the next move after [`MoveState::Fault`] or [`MoveState::TimedOut`], as far as that may be done
-    /// from afar; what a person has to do at the controller is in the words of the next refusal.
+    /// without a person. What the controller's safety has stopped stays stopped.
     ///
     /// # Errors
     /// [`LinkError`].
     fn recover(&mut self) -> Result<(), LinkError>;
+
+    /// What a person has to see to before the robot may move; `None` when nothing, or when the controller does not tell.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    fn intervention(&mut self) -> Result<Option<Intervention>, LinkError> {
+        Ok(None)
+    }
+
+    /// A person has seen to what the latest [`RobotLink::intervention`] told, and has confirmed it; to be called for no other reason. Has
+    /// the controller release that stop, and none that came since, where it is done from afar. Whether it has, the next
+    /// [`RobotLink::intervention`] tells.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    fn release(&mut self) -> Result<(), LinkError> {
+        Ok(())
+    }
 
     /// From here on no answer is waited for any longer once the flag is set, but for what stops the robot: [`LinkError::Stopped`] comes
     /// instead. A link that never waits has nothing to heed.

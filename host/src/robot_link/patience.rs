@@ -16,7 +16,7 @@ pub struct Patience {
     pub stand: Duration,
     /// Added to the time that a move takes by its speed.
     pub margin: Duration,
-    /// Until a controller has recovered.
+    /// Until a controller has recovered, or released a stop after a person has confirmed it.
     pub recover: Duration,
 }
 

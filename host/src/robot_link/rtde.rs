@@ -6,7 +6,10 @@
 //!
 //! Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", and its Python client library
 //! (UniversalRobots/RTDE_Python_Client_Library: rtde/rtde.py, rtde/serialize.py); values of the modes as in its C++ client library
-//! (UniversalRobots/Universal_Robots_Client_Library: ur/datatypes.h, rtde/data_package.h).
+//! (UniversalRobots/Universal_Robots_Client_Library: include/ur_client_library/ur/datatypes.h, rtde/data_package.h). How fast a program
+//! goes is the product of `speed_scaling` and `target_speed_fraction`, and nothing while it is paused, as in UR's ROS driver
+//! (UniversalRobots/Universal_Robots_ROS_scaled_controllers: speed_scaling_state_controller/README.md) and in ur_rtde
+//! (`getSpeedScalingCombined`).
 
 use std::time::Duration;
 
@@ -22,10 +25,10 @@ const RATE_HZ: f64 = 125.0;
 const HEAD: usize = 3;
 /// No package of the fields asked for, and no text, is longer.
 const PACKAGE_MAX: usize = 1024;
-const FIELDS: &str = "actual_q,actual_qd,target_q,robot_mode,safety_mode,runtime_state";
-const FIELD_TYPES: &str = "VECTOR6D,VECTOR6D,VECTOR6D,INT32,INT32,UINT32";
-/// Recipe, three vectors of six doubles, three words.
-const DATA_BYTES: usize = 1 + 3 * JOINTS * 8 + 3 * 4;
+const FIELDS: &str = "actual_q,actual_qd,target_q,robot_mode,safety_mode,runtime_state,speed_scaling,target_speed_fraction";
+const FIELD_TYPES: &str = "VECTOR6D,VECTOR6D,VECTOR6D,INT32,INT32,UINT32,DOUBLE,DOUBLE";
+/// Recipe, three vectors of six doubles, three words, two doubles.
+const DATA_BYTES: usize = 1 + 3 * JOINTS * 8 + 3 * 4 + 2 * 8;
 
 /// One data package.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +42,10 @@ pub(super) struct RobotState {
     pub(super) robot_mode: i32,
     pub(super) safety_mode: i32,
     pub(super) runtime_state: u32,
+    /// By how much the trajectory limiter slows the robot down, from 0 to 1.
+    pub(super) speed_scaling: f64,
+    /// The speed slider, from 0 to 1.
+    pub(super) target_speed_fraction: f64,
 }
 
 /// What is heard after the start.
@@ -62,6 +69,10 @@ impl RobotState {
     const PROTECTIVE_STOP: i32 = 3;
     const STOPPED: u32 = 1;
     const PLAYING: u32 = 2;
+    const PAUSING: u32 = 3;
+    const PAUSED: u32 = 4;
+    /// A program goes on, if more slowly than this can be told from standing.
+    const PACE_MIN: f64 = 1e-3;
 
     /// Why the robot cannot move now, in the controller's words; `None` when it can.
     pub(super) fn obstacle(&self) -> Option<String> {
@@ -85,13 +96,34 @@ impl RobotState {
         self.runtime_state == Self::STOPPED
     }
 
+    /// How fast a program goes, as a fraction of the speed that it asks for.
+    pub(super) fn pace(&self) -> f64 {
+        match self.runtime_state {
+            Self::PAUSING | Self::PAUSED => 0.0,
+            Self::PLAYING => (self.speed_scaling * self.target_speed_fraction).clamp(0.0, 1.0),
+            _ => 1.0,
+        }
+    }
+
+    /// What holds a program that runs, until somebody lets it go on; `None` when nothing does.
+    pub(super) fn hold(&self) -> Option<&'static str> {
+        match self.runtime_state {
+            Self::PAUSING | Self::PAUSED => Some("the program is paused at the teach pendant"),
+            _ if self.pace() >= Self::PACE_MIN => None,
+            _ if self.target_speed_fraction < Self::PACE_MIN => Some("the speed slider is at 0"),
+            _ => Some("the controller holds the robot back to speed 0 (speed_scaling)"),
+        }
+    }
+
     fn is_finite(&self) -> bool {
-        [self.q_rad, self.qd_rad_s, self.target_q_rad].iter().flatten().all(|value| value.is_finite())
+        let speeds = [self.speed_scaling, self.target_speed_fraction];
+        let joints = [self.q_rad, self.qd_rad_s, self.target_q_rad];
+        joints.iter().flatten().chain(&speeds).all(|value| value.is_finite())
     }
 }
 
-/// From 0.
-const SAFETY_MODES: [&str; 14] = [
+/// From 0. The RTDE guide ends with 11; the numbers from there on are the client library's, which has no 21.
+const SAFETY_MODES: [&str; 23] = [
     "",
     "NORMAL",
     "REDUCED",
@@ -106,6 +138,15 @@ const SAFETY_MODES: [&str; 14] = [
     "UNDEFINED_SAFETY_MODE",
     "AUTOMATIC_MODE_SAFEGUARD_STOP",
     "SYSTEM_THREE_POSITION_ENABLING_STOP",
+    "TP_THREE_POSITION_ENABLING_STOP",
+    "IMMI_EMERGENCY_STOP",
+    "IMMI_SAFEGUARD_STOP",
+    "PROFISAFE_WAITING_FOR_PARAMETERS",
+    "PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP",
+    "PROFISAFE_SAFEGUARD_STOP",
+    "PROFISAFE_EMERGENCY_STOP",
+    "",
+    "SAFETY_API_SAFEGUARD_STOP",
 ];
 
 /// From -1.
@@ -137,7 +178,7 @@ impl Rtde {
     pub(super) fn connect(host: &str, port: u16, wait: Duration) -> Result<Self, LinkError> {
         let mut rtde = Self { tcp: Tcp::connect(host, port, wait, &StopFlag::default())?, heard: Vec::new(), recipe: 0 };
         if rtde.ask(b'V', &2_u16.to_be_bytes(), wait)? != [1] {
-            return Err(rtde.tcp.unexpected("no".into(), "yes to RTDE protocol version 2 (software 3.3 or newer)"));
+            return Err(rtde.tcp.unexpected("no".into(), "yes to RTDE protocol version 2 (software 3.4 or newer)"));
         }
         let wanted = [RATE_HZ.to_be_bytes().as_slice(), FIELDS.as_bytes()].concat();
         let recipe = rtde.ask(b'O', &wanted, wait)?;
@@ -222,6 +263,7 @@ fn state(payload: &[u8], recipe: u8) -> Option<RobotState> {
         return None;
     }
     let word = |at: usize| <[u8; 4]>::try_from(&payload[at..at + 4]).ok();
+    let double = |at: usize| Some(f64::from_be_bytes(<[u8; 8]>::try_from(&payload[at..at + 8]).ok()?));
     let vector = |at: usize| -> Option<[f64; JOINTS]> {
         let mut values = [0.0; JOINTS];
         for (value, bytes) in values.iter_mut().zip(payload[at..].chunks_exact(8)) {
@@ -237,6 +279,8 @@ fn state(payload: &[u8], recipe: u8) -> Option<RobotState> {
         robot_mode: i32::from_be_bytes(word(words)?),
         safety_mode: i32::from_be_bytes(word(words + 4)?),
         runtime_state: u32::from_be_bytes(word(words + 8)?),
+        speed_scaling: double(words + 12)?,
+        target_speed_fraction: double(words + 20)?,
     };
     state.is_finite().then_some(state)
 }
@@ -262,7 +306,8 @@ mod tests {
     fn payload(value: f64) -> Vec<u8> {
         let words = [7_u32, 1, 2];
         let vectors = (0..3 * JOINTS).flat_map(|_| value.to_be_bytes());
-        [5].into_iter().chain(vectors).chain(words.into_iter().flat_map(u32::to_be_bytes)).collect()
+        let speeds = [0.5_f64, 0.8].into_iter().flat_map(f64::to_be_bytes);
+        [5].into_iter().chain(vectors).chain(words.into_iter().flat_map(u32::to_be_bytes)).chain(speeds).collect()
     }
 
     #[test]
@@ -270,6 +315,7 @@ mod tests {
         let robot = state(&payload(0.25), 5).unwrap();
         assert_eq!((robot.q_rad, robot.target_q_rad), ([0.25; JOINTS], [0.25; JOINTS]));
         assert!(robot.obstacle().is_none() && robot.is_playing());
+        assert_eq!((robot.speed_scaling, robot.target_speed_fraction), (0.5, 0.8));
         assert_eq!(state(&payload(0.25), 6), None);
         assert_eq!(state(&payload(f64::NAN), 5), None);
         assert_eq!(state(&payload(0.25)[1..], 5), None);
@@ -277,10 +323,28 @@ mod tests {
     }
 
     #[test]
+    fn slider_and_limiter_multiply_and_a_pause_holds_all() {
+        let with = |runtime_state, speed_scaling, target_speed_fraction| RobotState {
+            runtime_state,
+            speed_scaling,
+            target_speed_fraction,
+            ..state(&payload(0.0), 5).unwrap()
+        };
+        assert_eq!((with(2, 0.5, 0.8).pace(), with(2, 0.5, 0.8).hold()), (0.4, None));
+        assert_eq!(with(2, 1.5, 1.0).pace(), 1.0, "no move is given less time than at the speed that was asked for");
+        assert_eq!((with(4, 1.0, 1.0).pace(), with(3, 1.0, 1.0).pace()), (0.0, 0.0));
+        assert!(with(4, 1.0, 1.0).hold().unwrap().contains("paused"));
+        assert!(with(2, 1.0, 0.0).hold().unwrap().contains("speed slider"));
+        assert!(with(2, 0.0, 1.0).hold().unwrap().contains("speed_scaling"));
+        // Without a program there is nothing to slow down, whatever the fields say.
+        assert_eq!((with(1, 0.0, 0.0).pace(), with(1, 0.0, 0.0).hold()), (1.0, None));
+    }
+
+    #[test]
     fn no_bytes_make_it_panic() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for _ in 0..20_000 {
-            let bytes: Vec<u8> = (0..rng.random_range(0..200)).map(|_| rng.random()).collect();
+            let bytes: Vec<u8> = (0..rng.random_range(0..220)).map(|_| rng.random()).collect();
             let _ = (state(&bytes, 5), text(&bytes));
         }
         assert_eq!(text(&[3, b'a', b'b']), None);
@@ -296,7 +360,33 @@ mod tests {
         };
         assert_eq!(with(7, 2), None);
         assert_eq!(with(3, 1).unwrap(), "robot mode POWER_OFF");
-        assert_eq!(with(7, 5).unwrap(), "safety mode SAFEGUARD_STOP");
+        let modes = [
+            (3, "PROTECTIVE_STOP"),
+            (4, "RECOVERY"),
+            (5, "SAFEGUARD_STOP"),
+            (6, "SYSTEM_EMERGENCY_STOP"),
+            (7, "ROBOT_EMERGENCY_STOP"),
+            (8, "VIOLATION"),
+            (9, "FAULT"),
+            (10, "VALIDATE_JOINT_ID"),
+            (11, "UNDEFINED_SAFETY_MODE"),
+            (12, "AUTOMATIC_MODE_SAFEGUARD_STOP"),
+            (13, "SYSTEM_THREE_POSITION_ENABLING_STOP"),
+            (14, "TP_THREE_POSITION_ENABLING_STOP"),
+            (15, "IMMI_EMERGENCY_STOP"),
+            (16, "IMMI_SAFEGUARD_STOP"),
+            (17, "PROFISAFE_WAITING_FOR_PARAMETERS"),
+            (18, "PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP"),
+            (19, "PROFISAFE_SAFEGUARD_STOP"),
+            (20, "PROFISAFE_EMERGENCY_STOP"),
+            (22, "SAFETY_API_SAFEGUARD_STOP"),
+        ];
+        for (number, name) in modes {
+            assert_eq!(with(7, number).unwrap(), format!("safety mode {name}"));
+        }
+        for number in [-1, 0, 21, 23] {
+            assert_eq!(with(7, number).unwrap(), format!("safety mode number {number}"));
+        }
         assert_eq!(with(7, i32::MIN).unwrap(), "safety mode number -2147483648");
         assert_eq!(with(i32::MAX, 1).unwrap(), "robot mode number 2147483647");
     }

@@ -1,14 +1,19 @@
-//! Universal Robots controllers (CB3 from software 3.3 on, e-Series).
+//! Universal Robots controllers (CB3 from software 3.4 on, e-Series).
 //!
 //! A move is a program of one `movej`, sent to the secondary interface (port 30002), which runs it instead of what runs; `stopj`
-//! stops it the same way. What comes of it is heard by RTDE (port 30004). After a protective stop the dashboard (port 29999) is asked
-//! to release it.
+//! stops it the same way. What comes of it is heard by RTDE (port 30004). It may take as long as its speed, slowed down by the speed
+//! slider as that stands at every moment, asks for; a slider at 0 or a paused program is waited for.
+//!
+//! After a protective stop the dashboard (port 29999) is asked to release it, and only by [`RobotLink::release`], behind which stands
+//! a person who has looked: "Protective stops must never be acknowledged and reset automatically, it must always be a deliberate action
+//! by a user to resume after a protective stop". Nothing else that the controller's safety has done is reset from here.
 //!
 //! Joint angles are the controller's, radians, base to wrist 3: robot.toml must have the same zeros and senses, as the built-in
 //! `ur5e` has.
 //!
-//! Source: Universal Robots, "The URScript Programming Language" (`movej`, `stopj`; from memory), and the sources of the RTDE and dashboard
-//! modules beside this one.
+//! Sources: Universal Robots, "The URScript Programming Language" (`movej`, `stopj`; from memory); e-Series service manual, software
+//! 5.21, "Ignoring protective stops" (quoted above), and "Protective Stop Service Note" of 24 July 2020 ("Setting up automatic reset of
+//! Protective Stop warnings is prohibited"); and the sources of the modules beside this one.
 
 use std::time::{Duration, Instant};
 
@@ -16,8 +21,8 @@ use ballbar::JointVector;
 
 use super::dashboard::Dashboard;
 use super::rtde::{Heard, JOINTS, RobotState, Rtde};
-use super::tcp::Tcp;
-use super::{JointSpeed, LinkError, MoveState, Patience, RobotLink};
+use super::ur_script_port::{Control, ScriptPort};
+use super::{Intervention, JointSpeed, LinkError, MoveState, Patience, RobotLink};
 use crate::deadline::{Deadline, StopFlag, WaitOver};
 
 /// Acceleration of moves, radians per second squared: `movej`'s default.
@@ -28,8 +33,7 @@ const STOP_RAD_S2: f64 = 4.0;
 const TOLERANCE_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 /// A joint slower than this stands, radians per second.
 const STANDING_RAD_S: f64 = 0.01;
-/// What the secondary interface sends is read away; so much in one go.
-const DISCARD_BYTES: usize = 1 << 16;
+const LOCAL_CONTROL: &str = "the controller is in local control, and takes no programs";
 /// Messages that one poll takes: seconds' worth.
 const MESSAGES_A_POLL: usize = 512;
 
@@ -55,12 +59,14 @@ pub struct UrLink {
     host: String,
     ports: UrPorts,
     patience: Patience,
-    script: Tcp,
+    script: ScriptPort,
     rtde: Rtde,
     latest: RobotState,
     heard_at: Instant,
-    /// What the controller told people since the move was sent, and the dashboard at the latest recovery.
+    /// What the controller told people since the move was sent, and the dashboard at the latest release.
     words: Vec<String>,
+    /// Whether the latest intervention told of a protective stop: no other one is released.
+    has_told_stop: bool,
     course: Option<Course>,
     moves: u64,
     stop: StopFlag,
@@ -70,12 +76,20 @@ pub struct UrLink {
 struct Course {
     goal_rad: [f64; JOINTS],
     sent: Instant,
+    /// How long the move may take at the speed that it was sent with.
     allowed: Duration,
+    /// How much of that has passed until `counted`: time while the robot is slowed down counts in proportion.
+    spent: Duration,
+    counted: Instant,
     /// Whether it was seen running.
     has_begun: bool,
     /// Since when the robot stands, without a program, elsewhere than at the goal.
     stands_since: Option<Instant>,
+    /// Since when the robot stands because something holds the program, and what.
+    held: Option<(Instant, &'static str)>,
     is_stopped_by_us: bool,
+    /// The controller did not take the program.
+    is_unheard: bool,
     state: MoveState,
 }
 
@@ -85,13 +99,15 @@ impl UrLink {
     /// # Errors
     /// [`LinkError`].
     pub fn connect(host: &str, ports: UrPorts, patience: Patience) -> Result<Self, LinkError> {
-        let script = Tcp::connect(host, ports.script, patience.answer, &StopFlag::default())?;
+        let mut script = ScriptPort::connect(host, ports.script, ports.dashboard, patience.answer)?;
         let mut rtde = Rtde::connect(host, ports.rtde, patience.answer)?;
         let latest = first_state(&mut rtde, patience.answer)?.ok_or_else(|| LinkError::Unexpected {
             address: format!("{host}:{}", ports.rtde),
             found: "nothing".into(),
             expected: "RTDE data packages after the start",
         })?;
+        // In local control the connection is deaf, also later.
+        script.control(&StopFlag::default())?;
         Ok(Self {
             host: host.to_owned(),
             ports,
@@ -101,6 +117,7 @@ impl UrLink {
             latest,
             heard_at: Instant::now(),
             words: Vec::new(),
+            has_told_stop: false,
             course: None,
             moves: 0,
             stop: StopFlag::default(),
@@ -109,7 +126,7 @@ impl UrLink {
 
     /// Takes in all that the controller has said.
     fn listen(&mut self) -> Result<(), LinkError> {
-        self.script.discard(DISCARD_BYTES)?;
+        self.script.discard();
         for _ in 0..MESSAGES_A_POLL {
             match self.rtde.next()? {
                 None => break,
@@ -136,10 +153,9 @@ impl UrLink {
     }
 
     /// Asks the dashboard to release a protective stop, as often as time allows.
-    fn release(&mut self, deadline: &Deadline) -> Result<(), LinkError> {
+    fn unlock(&mut self, deadline: &Deadline) -> Result<(), LinkError> {
         let mut dashboard = Dashboard::connect(&self.host, self.ports.dashboard, self.patience.answer, &self.stop)?;
         dashboard.ask("close safety popup")?;
-        self.words.clear();
         while self.latest.is_in_protective_stop() {
             let reply = dashboard.ask("unlock protective stop")?;
             if reply.starts_with("Protective stop releasing") {
@@ -165,19 +181,26 @@ impl RobotLink for UrLink {
         format!("urscript at {}", self.host)
     }
 
+    /// Asks the dashboard first whether the controller takes programs, which takes some milliseconds; of one that does not answer,
+    /// [`Patience::answer`], once.
     fn start_move(&mut self, q: &JointVector<f64>, speed: &JointSpeed) -> Result<(), LinkError> {
         self.listen()?;
         let mut goal_rad = [0.0; JOINTS];
         goal_rad.copy_from_slice(&q.as_array()[..JOINTS]);
         let v_rad_s = speed.revolute_rad_s;
         let way_rad = largest(&goal_rad, &self.latest.q_rad);
+        let now = Instant::now();
         let mut course = Course {
             goal_rad,
-            sent: Instant::now(),
+            sent: now,
+            spent: Duration::ZERO,
+            counted: now,
             allowed: self.patience.allowed(way_rad / v_rad_s + v_rad_s / ACCELERATION_RAD_S2),
             has_begun: false,
             stands_since: None,
+            held: None,
             is_stopped_by_us: false,
+            is_unheard: false,
             state: MoveState::Moving,
         };
         let is_sound = goal_rad.iter().all(|q| q.is_finite()) && v_rad_s.is_finite() && v_rad_s > 0.0;
@@ -191,7 +214,11 @@ impl RobotLink for UrLink {
             let number = self.moves;
             let program =
                 format!("def ballbar_{number}():\n  movej([{joints}], a={ACCELERATION_RAD_S2:.3}, v={v_rad_s:.6})\nend\n");
-            self.script.write_all(program.as_bytes())?;
+            if self.script.send(&program, &self.stop)? == Control::Local {
+                course.state = MoveState::Refused(LOCAL_CONTROL.into());
+            }
+            // The dashboard may have taken its time to answer.
+            (course.sent, course.counted) = (Instant::now(), Instant::now());
         }
         self.course = Some(course);
         Ok(())
@@ -202,7 +229,10 @@ impl RobotLink for UrLink {
         self.listen()?;
         let Some(course) = &mut self.course else { return Ok(MoveState::Reached) };
         course.lapse();
-        Ok(course.state.clone())
+        if course.is_unheard {
+            self.script.forget();
+        }
+        Ok(course.told(&self.patience))
     }
 
     fn joints(&mut self) -> Result<Option<JointVector<f64>>, LinkError> {
@@ -216,19 +246,42 @@ impl RobotLink for UrLink {
         if let Some(course) = &mut self.course {
             course.is_stopped_by_us = true;
         }
-        self.script.write_all(format!("stopj({STOP_RAD_S2:.1})\n").as_bytes())
+        self.script.send_regardless(&format!("stopj({STOP_RAD_S2:.1})\n"))
     }
 
-    /// Ends what runs and, after a protective stop, has the dashboard release it. Takes as long as [`Patience::recover`] at most: a
-    /// controller does not release a protective stop within the first five seconds. Where the dashboard does not answer, nothing is
-    /// released.
+    /// Ends what runs. What the controller's safety has stopped stays as it is.
     fn recover(&mut self) -> Result<(), LinkError> {
+        self.listen()?;
+        if self.latest.obstacle().is_none() { self.stop() } else { Ok(()) }
+    }
+
+    fn intervention(&mut self) -> Result<Option<Intervention>, LinkError> {
+        self.listen()?;
+        self.has_told_stop = self.latest.is_in_protective_stop();
+        if let Some(obstacle) = self.latest.obstacle() {
+            let remedy = if self.has_told_stop {
+                "Look at the robot, and remove what made it stop: it is released when you confirm"
+            } else {
+                "See to it at the controller, until the robot is ready to move"
+            };
+            return Ok(Some(Intervention { what: with_words(obstacle, &self.words), remedy }));
+        }
+        let is_local = self.script.control(&self.stop)? == Control::Local;
+        let remedy = "Switch it to remote control, at the top right of the teach pendant";
+        Ok(is_local.then(|| Intervention { what: LOCAL_CONTROL.into(), remedy }))
+    }
+
+    /// Has the dashboard release the protective stop that was told, and ends the program that it had paused; one that came since is for
+    /// the next question. Takes as long as [`Patience::recover`] at most: a controller does not release a protective stop within the first
+    /// five seconds. Where the dashboard does not answer, nothing is released.
+    fn release(&mut self) -> Result<(), LinkError> {
         let deadline = Deadline::after(self.patience.recover, &self.stop);
         self.listen()?;
-        if self.latest.obstacle().is_none() {
-            return self.stop();
+        if !std::mem::take(&mut self.has_told_stop) || !self.latest.is_in_protective_stop() {
+            return Ok(());
         }
-        match self.release(&deadline) {
+        self.words.clear();
+        match self.unlock(&deadline) {
             Ok(()) => {}
             Err(LinkError::Stopped) => return Err(LinkError::Stopped),
             Err(error) => self.words.push(error.to_string()),
@@ -240,7 +293,7 @@ impl RobotLink for UrLink {
                 Err(WaitOver::Stopped) => return Err(LinkError::Stopped),
             }
         }
-        Ok(())
+        if self.latest.obstacle().is_none() { self.stop() } else { Ok(()) }
     }
 
     fn heed(&mut self, stop: &StopFlag) {
@@ -254,7 +307,10 @@ impl Course {
         if self.state != MoveState::Moving {
             return;
         }
+        self.count(robot.pace());
         let is_standing = robot.qd_rad_s.iter().all(|qd| qd.abs() < STANDING_RAD_S);
+        self.held =
+            robot.hold().filter(|_| is_standing).map(|what| (self.held.map_or_else(Instant::now, |(since, _)| since), what));
         self.has_begun |= robot.is_playing() || !is_standing;
         if let Some(obstacle) = robot.obstacle() {
             self.state = self.ended(with_words(obstacle, words));
@@ -280,6 +336,7 @@ impl Course {
         } else if !self.has_begun && self.sent.elapsed() > patience.begin {
             let what = "the controller did not begin the move; is it in remote control?";
             self.state = self.ended(with_words(what.into(), words));
+            self.is_unheard = true;
         }
     }
 
@@ -288,11 +345,27 @@ impl Course {
         if self.has_begun { MoveState::Fault(words) } else { MoveState::Refused(words) }
     }
 
-    /// Ends a move that takes too long.
+    /// Counts the time since it was counted last, in which the robot went at this fraction of the speed asked for.
+    fn count(&mut self, pace: f64) {
+        let now = Instant::now();
+        self.spent += now.saturating_duration_since(self.counted).mul_f64(pace);
+        self.counted = now;
+    }
+
+    /// Ends a move that takes too long. Time in which nothing is heard counts in full.
     fn lapse(&mut self) {
-        let elapsed = self.sent.elapsed();
-        if self.state == MoveState::Moving && elapsed > self.allowed {
-            self.state = MoveState::TimedOut(elapsed);
+        if self.state == MoveState::Moving && self.spent + self.counted.elapsed() > self.allowed {
+            self.state = MoveState::TimedOut(self.sent.elapsed());
+        }
+    }
+
+    /// How the move stands, for others.
+    fn told(&self, patience: &Patience) -> MoveState {
+        match self.held {
+            Some((since, what)) if self.state == MoveState::Moving && since.elapsed() > patience.stand => {
+                MoveState::Held(what.to_owned())
+            }
+            _ => self.state.clone(),
         }
     }
 }

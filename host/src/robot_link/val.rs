@@ -18,6 +18,10 @@
 //! Joint angles are VAL's, degrees, joints 1 to 6: robot.toml must have the same zeros and senses. The built-in `puma560` has C. S. G.
 //! Lee's; whether a controller has these, `WHERE` beside `host-cal pose` tells.
 //!
+//! An envelope error, or arm power that is off, is for a person: power is switched on by a button, and nothing here is typed to get over
+//! it. A soft envelope error leaves the power on (of V+: Adept's forum, t=137, 12 May 2009): so no move follows
+//! either before somebody has looked.
+//!
 //! Sources: see the monitor's module beside this one.
 
 use std::time::{Duration, Instant};
@@ -27,7 +31,7 @@ use ballbar::JointVector;
 use super::patience::STOP_WAIT;
 use super::speed::percent;
 use super::val_monitor::{Heard, Monitor, is_complaint, where_deg};
-use super::{JointSpeed, LinkError, MoveState, Patience, RobotLink};
+use super::{Intervention, JointSpeed, LinkError, MoveState, Patience, RobotLink};
 
 pub use super::val_monitor::VAL_BAUD;
 use crate::deadline::StopFlag;
@@ -41,6 +45,9 @@ const TOLERANCE_DEG: f64 = 0.05;
 const STANDING_DEG: f64 = 0.02;
 /// From one `WHERE` to the next. The line carries one in a sixth of a second.
 const LOOK_EVERY: Duration = Duration::from_millis(150);
+
+/// What the controller's protection of arm and people says: whatever holds these words needs a person.
+const PROTECTION: [&str; 3] = ["ENVELOPE", "POWER OFF", "PANIC"];
 
 /// Lines from the first to `DO MOVE`, with some to spare.
 const LINES_BEFORE_GO: u32 = 8;
@@ -258,10 +265,29 @@ impl RobotLink for ValLink {
         }
     }
 
-    /// Brings the monitor back to its prompt. Arm power is for a person to switch on.
+    /// Brings the monitor back to its prompt, and nothing else.
     fn recover(&mut self) -> Result<(), LinkError> {
         self.monitor.interrupt()?;
         self.monitor.exchange("", self.patience.recover)?;
+        Ok(())
+    }
+
+    /// VAL does not tell whether arm power is on but by refusing a move: what the latest one ended with is what is known.
+    fn intervention(&mut self) -> Result<Option<Intervention>, LinkError> {
+        let words = match self.course.as_ref().map(|course| &course.state) {
+            Some(MoveState::Fault(words) | MoveState::Refused(words)) => words.to_uppercase(),
+            _ => return Ok(None),
+        };
+        let needs_person = PROTECTION.iter().any(|word| words.contains(word));
+        Ok(self.course.as_ref().filter(|_| needs_person).map(|course| Intervention {
+            what: course.words.join("; "),
+            remedy: "Look at the robot, remove what made it stop, and switch arm power on if it is off",
+        }))
+    }
+
+    /// Nothing is typed: the person has done it.
+    fn release(&mut self) -> Result<(), LinkError> {
+        self.course = None;
         Ok(())
     }
 

@@ -1,4 +1,5 @@
-//! The arm of an emulated controller: six joints that go straight, all together, at constant speed.
+//! The arm of an emulated controller: six joints that go straight, all together, at constant speed, or slower while something holds
+//! them back.
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -11,56 +12,79 @@ pub const JOINTS: usize = 6;
 pub struct Arm {
     from_rad: [f64; JOINTS],
     to_rad: [f64; JOINTS],
+    /// What the whole way takes at full speed, seconds.
+    way_s: f64,
+    /// How much of it was done at `since`.
+    done_s: f64,
     since: Instant,
-    until: Instant,
+    /// The fraction of its full speed that it goes at.
+    fraction: f64,
 }
 
 impl Arm {
     /// Standing.
     pub fn at_rest(q_rad: [f64; JOINTS], now: Instant) -> Self {
-        Self { from_rad: q_rad, to_rad: q_rad, since: now, until: now }
+        Self { from_rad: q_rad, to_rad: q_rad, way_s: 0.0, done_s: 0.0, since: now, fraction: 1.0 }
     }
 
     /// Joint angles at a time, radians.
     pub fn at(&self, now: Instant) -> [f64; JOINTS] {
-        let way = self.way(now);
-        std::array::from_fn(|i| self.from_rad[i] + way * (self.to_rad[i] - self.from_rad[i]))
+        let share = self.share(now);
+        std::array::from_fn(|i| self.from_rad[i] + share * (self.to_rad[i] - self.from_rad[i]))
     }
 
     /// Joint speeds at a time, radians per second.
     pub fn speed_at(&self, now: Instant) -> [f64; JOINTS] {
-        if now >= self.until {
+        if self.share(now) >= 1.0 {
             return [0.0; JOINTS];
         }
-        let duration_s = (self.until - self.since).as_secs_f64();
-        std::array::from_fn(|i| (self.to_rad[i] - self.from_rad[i]) / duration_s)
+        std::array::from_fn(|i| self.fraction * (self.to_rad[i] - self.from_rad[i]) / self.way_s)
     }
 
-    /// Whether it is on its way.
-    pub fn is_moving(&self, now: Instant) -> bool {
-        now < self.until
-    }
-
-    /// When the move is half done, and when it ends.
+    /// When the move is half done, and when it ends, if it goes on as it does.
     pub fn half_and_end(&self) -> (Instant, Instant) {
-        (self.since + (self.until - self.since) / 2, self.until)
+        let at = |share: f64| self.since + self.time_until(share);
+        (at(0.5), at(1.0))
     }
 
-    /// Sets out from where it is; all joints arrive after `duration`.
+    /// The share of the way that is done.
+    pub fn share(&self, now: Instant) -> f64 {
+        let done_s = self.done_s + self.fraction * now.saturating_duration_since(self.since).as_secs_f64();
+        if done_s < self.way_s { done_s / self.way_s } else { 1.0 }
+    }
+
+    /// Sets out from where it is; at full speed all joints arrive after `duration`.
     pub fn go(&mut self, to_rad: [f64; JOINTS], duration: Duration, now: Instant) {
-        *self = Self { from_rad: self.at(now), to_rad, since: now, until: now + duration };
+        let from_rad = self.at(now);
+        *self = Self { from_rad, to_rad, way_s: duration.as_secs_f64(), done_s: 0.0, since: now, ..*self };
+    }
+
+    /// Ends elsewhere than where it was to go.
+    pub fn divert(&mut self, to_rad: [f64; JOINTS], now: Instant) {
+        let left_s = (1.0 - self.share(now)) * self.way_s;
+        self.go(to_rad, Duration::from_secs_f64(left_s), now);
+    }
+
+    /// Where it ends.
+    pub fn goal_rad(&self) -> [f64; JOINTS] {
+        self.to_rad
+    }
+
+    /// Goes on at this fraction of its full speed; zero holds it where it is.
+    pub fn slow_to(&mut self, fraction: f64, now: Instant) {
+        (self.done_s, self.since) = (self.share(now) * self.way_s, now);
+        self.fraction = fraction;
     }
 
     /// Stops where it is.
     pub fn halt(&mut self, now: Instant) {
-        *self = Self::at_rest(self.at(now), now);
+        *self = Self { fraction: self.fraction, ..Self::at_rest(self.at(now), now) };
     }
 
-    fn way(&self, now: Instant) -> f64 {
-        if now >= self.until {
-            return 1.0;
-        }
-        now.saturating_duration_since(self.since).as_secs_f64() / (self.until - self.since).as_secs_f64()
+    /// From `since` until a share is done; a day, for what is never.
+    fn time_until(&self, share: f64) -> Duration {
+        let left_s = (share * self.way_s - self.done_s).max(0.0);
+        Duration::from_secs_f64((left_s / self.fraction.max(1e-9)).min(86_400.0))
     }
 }
 

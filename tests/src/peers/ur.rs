@@ -1,4 +1,7 @@
 //! An emulated Universal Robots controller: secondary interface, RTDE and dashboard, each on a port of its own.
+//!
+//! As a real one it stays in a protective stop until the dashboard is asked to unlock it, its program paused; goes as fast as the
+//! speed slider lets it; and takes programs only over connections that were made in remote control.
 
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,11 +30,14 @@ pub struct UrPeerOptions {
     pub pace: f64,
     /// Whether what it sends comes in pieces.
     pub is_split: bool,
+    /// Whether the dashboard knows of local and remote control: an e-Series from software 5.6 on.
+    pub tells_control: bool,
 }
 
 impl Default for UrPeerOptions {
     fn default() -> Self {
-        Self { q_rad: [0.0, -1.5, 1.5, -1.5, -1.5, 0.0], rate_max_hz: 500.0, pace: 20.0, is_split: false }
+        let q_rad = [0.0, -1.5, 1.5, -1.5, -1.5, 0.0];
+        Self { q_rad, rate_max_hz: 500.0, pace: 20.0, is_split: false, tells_control: true }
     }
 }
 
@@ -55,6 +61,12 @@ pub(super) struct World {
     pub(super) safety_mode: i32,
     protective_since: Option<Instant>,
     program: Option<Running>,
+    /// The program is paused: at the teach pendant, or by a protective stop.
+    is_paused: bool,
+    /// The speed slider, and the trajectory limiter, from 0 to 1.
+    pub(super) slider: f64,
+    pub(super) limiter: f64,
+    pub(super) is_remote: bool,
     next_mishap: Option<Mishap>,
     pub(super) is_silent: bool,
     pub(super) is_garbled: bool,
@@ -67,12 +79,13 @@ pub(super) struct World {
     /// What a client did against the protocol.
     problems: Vec<String>,
     programs: Vec<String>,
+    /// What the dashboard was asked.
+    asked: Vec<String>,
 }
 
-/// The program under way.
+/// The program under way. It ends with the arm's way, or at a time.
 struct Running {
-    half: Instant,
-    end: Instant,
+    end: Option<Instant>,
     mishap: Option<Mishap>,
 }
 
@@ -94,6 +107,10 @@ impl UrPeer {
                 safety_mode: 1,
                 protective_since: None,
                 program: None,
+                is_paused: false,
+                slider: 1.0,
+                limiter: 1.0,
+                is_remote: true,
                 next_mishap: None,
                 is_silent: false,
                 is_garbled: false,
@@ -102,6 +119,7 @@ impl UrPeer {
                 text: None,
                 problems: Vec::new(),
                 programs: Vec::new(),
+                asked: Vec::new(),
             }),
             is_ended: AtomicBool::new(false),
         });
@@ -131,6 +149,28 @@ impl UrPeer {
     pub fn set_modes(&self, robot_mode: i32, safety_mode: i32) {
         let mut world = self.shared.world();
         (world.robot_mode, world.safety_mode) = (robot_mode, safety_mode);
+        world.protective_since = (safety_mode == 3).then(Instant::now);
+    }
+
+    /// Sets the speed slider and the trajectory limiter, from 0 to 1.
+    pub fn set_speed(&self, slider: f64, limiter: f64) {
+        self.shared.change_pace(|world| (world.slider, world.limiter) = (slider, limiter));
+    }
+
+    /// Pauses the program at the teach pendant, or goes on with it.
+    pub fn set_paused(&self, is_paused: bool) {
+        self.shared.change_pace(|world| world.is_paused = is_paused);
+    }
+
+    /// Switches between local and remote control. Into local, connections that take programs are closed; into remote, those that
+    /// were made in local stay, and stay deaf.
+    pub fn set_remote(&self, is_remote: bool) {
+        self.shared.world().is_remote = is_remote;
+    }
+
+    /// What the dashboard was asked, but for whether the controller is in remote control.
+    pub fn asked(&self) -> Vec<String> {
+        self.shared.world().asked.iter().filter(|line| *line != "is in remote control").cloned().collect()
     }
 
     /// What clients did against the protocol.
@@ -203,7 +243,9 @@ impl Shared {
         match command {
             Command::StopJ => {
                 arm.halt(now);
-                world.program = Some(Running { half: now, end: now + Duration::from_millis(20), mishap: None });
+                world.program = Some(Running { end: Some(now + Duration::from_millis(20)), mishap: None });
+                world.is_paused = false;
+                world.set_pace(&mut arm, now);
             }
             Command::MoveJ { q_rad, v_rad_s, a_rad_s2 } => {
                 let mishap = world.next_mishap.take();
@@ -216,10 +258,22 @@ impl Shared {
                 }
                 let lead_rad = arm.at(now).iter().zip(q_rad).map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
                 arm.go(q_rad, Duration::from_secs_f64(lead_rad / v_rad_s / self.options.pace + 0.02), now);
-                let (half, end) = arm.half_and_end();
-                world.program = Some(Running { half, end, mishap });
+                world.program = Some(Running { end: None, mishap });
+                world.is_paused = false;
+                world.set_pace(&mut arm, now);
             }
         }
+    }
+
+    fn change_pace(&self, change: impl FnOnce(&mut World)) {
+        let mut world = self.world();
+        change(&mut world);
+        world.set_pace(&mut self.arm.lock().unwrap(), Instant::now());
+    }
+
+    /// Notes what the dashboard was asked.
+    pub(super) fn note_asked(&self, line: &str) {
+        self.world().asked.push(line.to_owned());
     }
 
     /// The dashboard's `unlock protective stop`: whether it is released.
@@ -237,19 +291,29 @@ impl Shared {
 
 impl World {
     pub(super) fn runtime_state(&self) -> u32 {
-        if self.program.is_some() { 2 } else { 1 }
+        match self.program {
+            Some(_) if self.is_paused => 4,
+            Some(_) => 2,
+            None => 1,
+        }
+    }
+
+    /// Lets the arm go as fast as the program, the slider and the limiter allow.
+    fn set_pace(&self, arm: &mut Arm, now: Instant) {
+        let fraction = if self.is_paused { 0.0 } else { self.slider * self.limiter };
+        arm.slow_to(fraction, now);
     }
 
     fn advance(&mut self, arm: &mut Arm, now: Instant) {
-        let Some(program) = &mut self.program else { return };
-        if now >= program.half {
+        let Some(program) = self.program.as_mut().filter(|_| !self.is_paused) else { return };
+        if arm.share(now) >= 0.5 {
             match program.mishap.take() {
                 Some(Mishap::FaultsHalfWay) => {
                     arm.halt(now);
                     self.safety_mode = 3;
                     self.protective_since = Some(now);
                     self.text = Some("C153A2: position deviates from path");
-                    self.program = None;
+                    self.is_paused = true;
                     return;
                 }
                 Some(Mishap::EndsHalfWay) => {
@@ -262,16 +326,16 @@ impl World {
                 Some(Mishap::TalksGarbage) => self.is_garbled = true,
                 Some(Mishap::StandsElsewhereByMrad(mrad)) => {
                     let offset_rad = f64::from(mrad) * 1e-3;
-                    let (_, end) = arm.half_and_end();
-                    let mut stand_rad = arm.at(end);
+                    let mut stand_rad = arm.goal_rad();
                     stand_rad[0] -= offset_rad;
-                    arm.go(stand_rad, end - now, now);
+                    arm.divert(stand_rad, now);
                     self.claim_offset_rad = offset_rad;
                 }
                 Some(Mishap::Refuses) | None => {}
             }
         }
-        if self.program.as_ref().is_some_and(|program| now >= program.end) {
+        let is_over = |program: &Running| program.end.map_or(arm.share(now) >= 1.0, |end| now >= end);
+        if self.program.as_ref().is_some_and(is_over) {
             self.program = None;
         }
     }

@@ -7,13 +7,15 @@ use std::time::{Duration, Instant};
 use super::ur::Shared;
 
 /// The fields that this controller knows, with their types.
-const KNOWN: [(&str, &str); 6] = [
+const KNOWN: [(&str, &str); 8] = [
     ("actual_q", "VECTOR6D"),
     ("actual_qd", "VECTOR6D"),
     ("target_q", "VECTOR6D"),
     ("robot_mode", "INT32"),
     ("safety_mode", "INT32"),
     ("runtime_state", "UINT32"),
+    ("speed_scaling", "DOUBLE"),
+    ("target_speed_fraction", "DOUBLE"),
 ];
 const RECIPE: u8 = 7;
 
@@ -96,6 +98,8 @@ fn data(shared: &Shared, names: &[&str]) -> Vec<u8> {
             "robot_mode" => world.robot_mode.to_be_bytes().to_vec(),
             "safety_mode" => world.safety_mode.to_be_bytes().to_vec(),
             "runtime_state" => world.runtime_state().to_be_bytes().to_vec(),
+            "speed_scaling" => world.limiter.to_be_bytes().to_vec(),
+            "target_speed_fraction" => world.slider.to_be_bytes().to_vec(),
             _ => doubles(claimed),
         });
     }

@@ -1,4 +1,5 @@
-//! The secondary interface: takes programs, and sends the robot's state ten times a second.
+//! The secondary interface: takes programs, and sends the robot's state ten times a second. A connection that was made in local
+//! control ignores programs as long as it lasts; one that was made in remote control ends with it.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -8,9 +9,15 @@ use super::JOINTS;
 use super::ur::{Command, Shared};
 
 pub(super) fn serve(shared: &Shared, mut stream: TcpStream) {
-    let drops = shared.world().drops;
+    let (drops, is_deaf) = {
+        let world = shared.world();
+        (world.drops, !world.is_remote)
+    };
     let (mut heard, mut told) = (String::new(), Instant::now());
     while !shared.is_ended() && shared.world().drops == drops {
+        if !is_deaf && !shared.world().is_remote {
+            return;
+        }
         if told.elapsed() > Duration::from_millis(100) {
             told = Instant::now();
             // A robot state message without sub-packages: its size and its type.
@@ -26,6 +33,9 @@ pub(super) fn serve(shared: &Shared, mut stream: TcpStream) {
             Err(_) => return,
         }
         while let Some(program) = whole_program(&mut heard) {
+            if is_deaf {
+                continue;
+            }
             match parse(&program) {
                 Ok(command) => shared.run(&program, command),
                 Err(problem) => shared.problem(format!("{problem} in `{program}`")),

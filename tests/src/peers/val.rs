@@ -64,6 +64,8 @@ pub struct ValPeer {
 #[derive(Default)]
 struct Wishes {
     is_ended: AtomicBool,
+    /// As an envelope error leaves it, until a person switches it on.
+    is_power_off: AtomicBool,
     next_mishap: Mutex<Option<Mishap>>,
     lines: Mutex<Vec<String>>,
 }
@@ -110,6 +112,11 @@ impl ValPeer {
     /// Lets something go wrong with the next move.
     pub fn next(&self, mishap: Mishap) {
         *self.wishes.next_mishap.lock().unwrap() = Some(mishap);
+    }
+
+    /// Switches arm power on, by the button.
+    pub fn switch_power_on(&self) {
+        self.wishes.is_power_off.store(false, Ordering::Relaxed);
     }
 
     /// The lines that were typed, without the empty ones and `WHERE`.
@@ -296,7 +303,7 @@ impl Controller {
             return Err(format!("*Position out of range* Jt {}", joint + 1));
         }
         let mishap = self.wishes.next_mishap.lock().unwrap().take();
-        if mishap == Some(Mishap::Refuses) {
+        if mishap == Some(Mishap::Refuses) || self.wishes.is_power_off.load(Ordering::Relaxed) {
             return Err("*Arm power off*".into());
         }
         let now = Instant::now();
@@ -319,6 +326,7 @@ impl Controller {
                 Some(Mishap::FaultsHalfWay) => {
                     self.arm.lock().unwrap().halt(now);
                     self.under_way = None;
+                    self.wishes.is_power_off.store(true, Ordering::Relaxed);
                     self.print("\r\n*Envelope error* Jt 2\r\n");
                     self.prompt();
                     return std::ops::ControlFlow::Continue(());

@@ -6,16 +6,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use ballbar_tests::command::host_cal_command;
 use ballbar_tests::crew::Crew;
 use ballbar_tests::peers::ur::{UrPeer, UrPeerOptions};
 use ballbar_tests::peers::val::{ValPeer, ValPeerOptions};
 use ballbar_tests::peers::{JointsAt, Mishap};
-use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, column, plant, quick};
-use host_cal::collect::{CollectError, Ended, Wish};
+use ballbar_tests::simulated_cell::{DESIGN, RIG, SHORT_PLAN, SimulatedCell, column, plant, quick};
+use ballbar_tests::terminal::AtTerminal;
+use host_cal::collect::{CollectError, Ended, Event, Operator, Wish};
 use host_cal::robot_link::sim::{SimClient, SimRequest};
 use host_cal::robot_link::urscript::UrLink;
 use host_cal::robot_link::val::{VAL_BAUD, ValLink, ValSpeeds};
-use host_cal::robot_link::{Patience, RobotLink};
+use host_cal::robot_link::{LinkError, Patience, RobotLink};
 
 /// How many times faster than in the world the controllers go.
 const PACE: f64 = 10.0;
@@ -68,22 +70,247 @@ fn measures_three(cell: &SimulatedCell, link: &mut dyn RobotLink) -> Vec<String>
     collected.summary.troubles
 }
 
+/// A controller whose arm stands where the simulated robot does.
+fn ur() -> UrPeer {
+    UrPeer::start(UrPeerOptions { q_rad: [0.0; 6], pace: PACE, ..UrPeerOptions::default() })
+}
+
 #[test]
-fn a_universal_robots_controller_walks_a_plan_and_gets_over_a_protective_stop() {
-    let cell = cell();
-    let peer = UrPeer::start(UrPeerOptions { q_rad: [0.0; 6], pace: PACE, ..UrPeerOptions::default() });
+fn a_universal_robots_controller_walks_a_plan() {
+    let (cell, peer) = (cell(), ur());
+    let _shadow = Shadow::start(&cell, peer.joints());
+    let mut link = UrLink::connect("127.0.0.1", peer.ports(), Patience::default()).unwrap();
+    assert_eq!(measures_three(&cell, &mut link), [""; 0]);
+    assert_eq!(peer.problems(), [""; 0]);
+}
+
+/// Looks at a robot for a while before it confirms, and does something meanwhile.
+struct Looks<'a> {
+    crew: Crew,
+    peer: &'a UrPeer,
+    /// What is done at the controller before it is confirmed.
+    remedy: fn(&UrPeer),
+    /// How often it was asked to look, and in which words.
+    asked: Vec<String>,
+    confirms_at: Option<Instant>,
+    /// What the dashboard had been asked until it was confirmed.
+    before_key: Vec<String>,
+}
+
+impl<'a> Looks<'a> {
+    fn new(cell: &SimulatedCell, peer: &'a UrPeer, remedy: fn(&UrPeer)) -> Self {
+        let crew = Crew::wishing(cell, &[(3, Wish::Quit)]);
+        Self { crew, peer, remedy, asked: Vec::new(), confirms_at: None, before_key: Vec::new() }
+    }
+}
+
+impl Operator for Looks<'_> {
+    fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
+        if let Event::Inspect { place, needed } = event {
+            self.asked.push(format!("{place}: {}", needed.what));
+            self.confirms_at = Some(Instant::now() + Duration::from_secs(1));
+        }
+        self.crew.tell(event)
+    }
+
+    fn is_present(&self) -> bool {
+        true
+    }
+
+    fn wish(&mut self) -> Option<Wish> {
+        let Some(at) = self.confirms_at else { return self.crew.wish() };
+        if Instant::now() < at {
+            return None;
+        }
+        self.confirms_at = None;
+        self.before_key.extend(self.peer.asked());
+        (self.remedy)(self.peer);
+        Some(Wish::Confirm)
+    }
+}
+
+#[test]
+fn a_protective_stop_is_released_by_the_operator_s_key_and_by_nothing_else() {
+    let (cell, peer) = (cell(), ur());
     let _shadow = Shadow::start(&cell, peer.joints());
     let mut link = UrLink::connect("127.0.0.1", peer.ports(), Patience::default()).unwrap();
     peer.next(Mishap::FaultsHalfWay);
-    let troubles = measures_three(&cell, &mut link);
-    assert!(troubles.is_empty() || troubles.iter().any(|words| words.contains("trying again")), "{troubles:?}");
+    let mut looks = Looks::new(&cell, &peer, |_| ());
+    let collected = cell.collect_with("session", Some(&mut link), &mut looks, quick());
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Quit, "{:?}", looks.crew.told);
+    assert_eq!(column(&cell.path("session"), "plan_row").len(), 3);
+    assert_eq!(looks.before_key, [""; 0], "nothing is reset before the key");
+    let [asked] = &looks.asked[..] else { panic!("asked once: {:?}", looks.asked) };
+    for words in ["on the way to line ", "PROTECTIVE_STOP", "C153A2: position deviates from path"] {
+        assert!(asked.contains(words), "{asked}");
+    }
+    assert!(peer.asked().contains(&"unlock protective stop".to_owned()));
+    let troubles = &collected.summary.troubles;
+    for words in ["the robot stood on the way", "the operator has confirmed", "trying again"] {
+        assert!(troubles.iter().any(|trouble| trouble.contains(words)), "{troubles:?}");
+    }
     assert_eq!(peer.problems(), [""; 0]);
 }
 
 #[test]
+fn a_run_goes_on_when_the_controller_is_back_in_remote_control_or_has_been_seen_to() {
+    type Act = fn(&UrPeer);
+    let cases: [(&str, Act, Act); 2] = [
+        ("local control", |peer| peer.set_remote(false), |peer| peer.set_remote(true)),
+        ("ROBOT_EMERGENCY_STOP", |peer| peer.set_modes(7, 7), |peer| peer.set_modes(7, 1)),
+    ];
+    for (what, spoil, remedy) in cases {
+        let (cell, peer) = (cell(), ur());
+        let _shadow = Shadow::start(&cell, peer.joints());
+        let mut link = UrLink::connect("127.0.0.1", peer.ports(), Patience::default()).unwrap();
+        spoil(&peer);
+        let mut looks = Looks::new(&cell, &peer, remedy);
+        let collected = cell.collect_with("session", Some(&mut link), &mut looks, quick());
+        assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Quit, "{what}: {:?}", looks.crew.told);
+        assert!(looks.asked.len() == 1 && looks.asked[0].contains(what), "{:?}", looks.asked);
+        assert_eq!(column(&cell.path("session"), "plan_row").len(), 3, "{what}");
+        assert_eq!(peer.asked(), [""; 0], "{what}");
+    }
+}
+
+#[test]
+fn with_nobody_there_a_protective_stop_ends_the_run_and_stays() {
+    let (cell, peer) = (cell(), ur());
+    let _shadow = Shadow::start(&cell, peer.joints());
+    let mut link = UrLink::connect("127.0.0.1", peer.ports(), Patience::default()).unwrap();
+
+    /// Trips the robot when three poses are measured; is not there.
+    struct Absent<'a> {
+        crew: Crew,
+        peer: &'a UrPeer,
+    }
+    impl Operator for Absent<'_> {
+        fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
+            self.crew.tell(event)?;
+            if matches!(event, Event::Measured(_)) && self.crew.measured == 3 {
+                self.peer.next(Mishap::FaultsHalfWay);
+            }
+            Ok(())
+        }
+        fn wish(&mut self) -> Option<Wish> {
+            self.crew.wish()
+        }
+    }
+    let mut absent = Absent { crew: Crew::new(&cell), peer: &peer };
+    let collected = cell.collect_with("session", Some(&mut link), &mut absent, quick());
+    let error = collected.ended.unwrap_err();
+    assert!(matches!(&error, CollectError::NobodyToLook { what, .. } if what.contains("PROTECTIVE_STOP")), "{error}");
+    assert!(error.to_string().contains("on the way to line "), "{error}");
+    assert_eq!(column(&cell.path("session"), "plan_row").len(), 3, "all that was measured is kept");
+    assert_eq!(peer.asked(), [""; 0], "the stop is left as it is");
+}
+
+#[test]
+fn a_speed_slider_at_zero_is_said_and_waited_for() {
+    let (cell, peer) = (cell(), ur());
+    let _shadow = Shadow::start(&cell, peer.joints());
+    let mut link = UrLink::connect("127.0.0.1", peer.ports(), Patience::default()).unwrap();
+    peer.set_speed(0.0, 1.0);
+
+    /// Moves the slider when the robot is said to wait.
+    struct Slides<'a> {
+        crew: Crew,
+        peer: &'a UrPeer,
+    }
+    impl Operator for Slides<'_> {
+        fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
+            if matches!(event, Event::Trouble(words) if words.contains("the robot waits: the speed slider is at 0")) {
+                self.peer.set_speed(0.5, 1.0);
+            }
+            self.crew.tell(event)
+        }
+        fn wish(&mut self) -> Option<Wish> {
+            self.crew.wish()
+        }
+    }
+    let mut slides = Slides { crew: Crew::wishing(&cell, &[(3, Wish::Quit)]), peer: &peer };
+    let collected = cell.collect_with("session", Some(&mut link), &mut slides, quick());
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Quit, "{:?}", slides.crew.told);
+    assert!(slides.crew.told.iter().any(|words| words.contains("the robot goes on")), "{:?}", slides.crew.told);
+    assert_eq!(column(&cell.path("session"), "plan_row").len(), 3);
+}
+
+/// Arguments of `host-cal collect` by a controller.
+fn collect_args(peer: &UrPeer) -> Vec<String> {
+    let ports = peer.ports();
+    let ports = format!("{},{},{}", ports.script, ports.rtde, ports.dashboard);
+    let words = ["collect", "port", "--session", "session", "--plan", "plan.csv", "--robot", DESIGN, "--rig", RIG];
+    let link = ["--robot-link", "urscript", "--robot-address", "127.0.0.1", "--robot-ports", &ports, "--rate", "200"];
+    [&words[..], &link].concat().into_iter().map(str::to_owned).collect()
+}
+
+#[test]
+fn the_command_with_yes_ends_at_a_protective_stop_and_says_so() {
+    let (cell, peer) = (cell(), ur());
+    let _shadow = Shadow::start(&cell, peer.joints());
+    peer.next(Mishap::FaultsHalfWay);
+    let args = collect_args(&peer);
+    let args: Vec<&str> = args.iter().map(String::as_str).chain(["--yes"]).collect();
+    let run = cell.host_cal(&args);
+    assert_eq!(run.code, 2, "{}", run.transcript());
+    for words in ["PROTECTIVE_STOP", "C153A2", "nothing was released", "Look at the robot", "without --yes"] {
+        assert!(run.stderr.contains(words), "{words}: {}", run.transcript());
+    }
+    assert!(run.stdout.contains("The same command goes on."), "{}", run.transcript());
+    assert_eq!(peer.asked(), [""; 0]);
+}
+
+#[test]
+fn the_command_asks_at_the_terminal_and_releases_at_the_key() {
+    let (cell, peer) = (cell(), ur());
+    let _shadow = Shadow::start(&cell, peer.joints());
+    peer.next(Mishap::FaultsHalfWay);
+    let args = collect_args(&peer);
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let mut run = AtTerminal::start(cell.folder.path(), &args, (120, 50));
+    run.wait_for("then press Enter");
+    run.press("\r");
+    run.wait_for("THE ROBOT STANDS on the way to line ");
+    run.wait_for("it is released when you confirm, then press Enter");
+    assert!(run.text().contains("C153A2"), "{}", run.text());
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(peer.asked(), [""; 0]);
+    run.press("\r");
+    run.wait_for("the operator has confirmed");
+    assert_eq!(peer.asked().last().unwrap(), "unlock protective stop");
+    run.wait_for("Attach the bar");
+    run.press("q");
+    let (code, text) = run.finish();
+    assert_eq!(code, 1, "{text}");
+}
+
+#[test]
+fn what_was_typed_before_the_stop_does_not_release_it() {
+    let (cell, peer) = (cell(), ur());
+    let _shadow = Shadow::start(&cell, peer.joints());
+    peer.next(Mishap::FaultsHalfWay);
+    let args = collect_args(&peer);
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    // Ten times Enter, and then nobody any more.
+    let mut command = host_cal_command(cell.folder.path(), &args);
+    let mut child = command
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::io::Write::write_all(&mut child.stdin.take().unwrap(), &[b'\n'; 10]).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("THE ROBOT STANDS"), "{said}");
+    assert!(!said.contains("the operator has confirmed"), "{said}");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert_eq!(peer.asked(), [""; 0]);
+}
+
+#[test]
 fn a_universal_robots_controller_that_lies_is_found_out() {
-    let cell = cell();
-    let peer = UrPeer::start(UrPeerOptions { q_rad: [0.0; 6], pace: PACE, ..UrPeerOptions::default() });
+    let (cell, peer) = (cell(), ur());
     let _shadow = Shadow::start(&cell, peer.joints());
     let mut link = UrLink::connect("127.0.0.1", peer.ports(), Patience::default()).unwrap();
     peer.next(Mishap::StandsElsewhereByMrad(30));

@@ -2,6 +2,7 @@
 
 mod dribbling;
 mod ur;
+mod ur_safety;
 #[cfg(unix)]
 mod val;
 

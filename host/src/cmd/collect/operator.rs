@@ -89,8 +89,7 @@ impl Terminal {
         Ok(())
     }
 
-    fn ask(&mut self, what: &str, bar: String) {
-        let words = format!("{what} {bar}");
+    fn ask(&mut self, words: String) {
         if !matches!(self.hand, Hand::Person) {
             return self.screen.note(&words);
         }
@@ -99,18 +98,31 @@ impl Terminal {
         self.screen.forget(Key::Enter);
         self.asked = Some(words);
     }
+
+    /// Whatever was typed before the robot stopped does not release it.
+    fn forget_typed(&mut self) {
+        [Key::Letter('y'), Key::Letter('r')].into_iter().for_each(|key| self.screen.forget(key));
+        if let Some(lines) = &self.lines {
+            while lines.try_recv().is_ok() {}
+        }
+    }
 }
 
 impl Operator for Terminal {
     fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
         match event {
             Event::Attach(bar) => {
-                self.ask("Attach", words(bar));
+                self.ask(format!("Attach {}", words(bar)));
                 self.attach(Some(bar))?;
             }
             Event::Detach(bar) => {
-                self.ask("Take off", bar.map_or("the bar, if it is on".into(), words));
+                self.ask(format!("Take off {}", bar.map_or("the bar, if it is on".into(), words)));
                 self.attach(None)?;
+            }
+            Event::Inspect { place, needed } => {
+                self.forget_typed();
+                self.screen.note(&format!("THE ROBOT STANDS {place}: {}", needed.what));
+                self.ask(needed.remedy.to_owned());
             }
             Event::Attached(bar) => self.screen.note(&format!("attached: {}", words(bar))),
             Event::Drive { line, q } => {
@@ -155,6 +167,10 @@ impl Operator for Terminal {
             }
         }
         Ok(())
+    }
+
+    fn is_present(&self) -> bool {
+        matches!(self.hand, Hand::Person)
     }
 
     fn wish(&mut self) -> Option<Wish> {

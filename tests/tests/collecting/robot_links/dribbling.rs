@@ -137,6 +137,7 @@ fn stopped_ur(dashboard: u16) -> (UrPeer, UrLink) {
     let speed = JointSpeed { revolute_rad_s: 2.0, prismatic_m_s: 0.25 };
     link.start_move(&joint_vector(&[0.5, -1.2, 1.3, -1.6, -1.4, 0.3]), &speed).unwrap();
     assert!(matches!(end_of_move(&mut link).unwrap(), MoveState::Fault(_)));
+    assert!(link.intervention().unwrap().is_some());
     (peer, link)
 }
 
@@ -149,7 +150,7 @@ fn a_dashboard_that_dribbles_its_line_is_given_up() {
     ] {
         let (_peer, mut link) = stopped_ur(dashboard);
         let began = Instant::now();
-        link.recover().unwrap();
+        link.release().unwrap();
         assert!(began.elapsed() < SOON, "{what}: {:?}", began.elapsed());
         assert!(matches!(link.start_move(&joint_vector(&[0.0; 6]), &JointSpeed::default()), Ok(())));
         assert!(matches!(link.poll().unwrap(), MoveState::Refused(words) if words.contains("PROTECTIVE_STOP")), "{what}");
@@ -157,13 +158,13 @@ fn a_dashboard_that_dribbles_its_line_is_given_up() {
 }
 
 #[test]
-fn a_recovery_is_given_up_when_the_user_wants_to_end() {
+fn a_release_is_given_up_when_the_user_wants_to_end() {
     let dashboard = listen(|stream| dribble(stream, b"", b"x", SLOW));
     let (_peer, mut link) = stopped_ur(dashboard);
     let stop = StopFlag::default();
     link.heed(&stop);
     let began = set_soon(&stop);
-    assert!(matches!(link.recover(), Err(LinkError::Stopped)));
+    assert!(matches!(link.release(), Err(LinkError::Stopped)));
     assert!(began.elapsed() < AT_ONCE, "{:?}", began.elapsed());
     link.stop().unwrap();
 }

@@ -1,8 +1,8 @@
-//! Universal Robots.
+//! Universal Robots: moves, how long they may take, and what is wrong with a controller.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ballbar_tests::peers::Mishap;
 use ballbar_tests::peers::ur::{UrPeer, UrPeerOptions};
@@ -11,23 +11,16 @@ use host_cal::robot_link::{JointSpeed, LinkError, MoveState, Patience, RobotLink
 
 use super::{end_of_move, joint_vector, largest, patience};
 
-const GOAL_RAD: [f64; 6] = [0.5, -1.2, 1.3, -1.6, -1.4, 0.3];
-const SPEED: JointSpeed = JointSpeed { revolute_rad_s: 0.1, prismatic_m_s: 0.25 };
+pub(super) const GOAL_RAD: [f64; 6] = [0.5, -1.2, 1.3, -1.6, -1.4, 0.3];
+pub(super) const SPEED: JointSpeed = JointSpeed { revolute_rad_s: 0.1, prismatic_m_s: 0.25 };
 
-fn connect(peer: &UrPeer) -> UrLink {
+pub(super) fn connect(peer: &UrPeer) -> UrLink {
     UrLink::connect("127.0.0.1", peer.ports(), patience()).unwrap()
 }
 
-fn go(link: &mut UrLink, q_rad: &[f64; 6]) -> Result<MoveState, LinkError> {
+pub(super) fn go(link: &mut UrLink, q_rad: &[f64; 6]) -> Result<MoveState, LinkError> {
     link.start_move(&joint_vector(q_rad), &SPEED)?;
     end_of_move(link)
-}
-
-fn words(state: MoveState) -> String {
-    match state {
-        MoveState::Refused(words) | MoveState::Fault(words) => words,
-        other => panic!("{other:?}"),
-    }
 }
 
 #[test]
@@ -67,23 +60,99 @@ fn where_the_arm_is_already_is_reached() {
 }
 
 #[test]
-fn a_controller_in_local_mode_refuses_and_later_does_not() {
+fn a_move_that_is_not_begun_is_refused_and_a_later_one_is_not() {
     let peer = UrPeer::start(UrPeerOptions::default());
     let mut link = connect(&peer);
     peer.next(Mishap::Refuses);
     let state = go(&mut link, &GOAL_RAD).unwrap();
-    assert!(matches!(&state, MoveState::Refused(words) if words.contains("remote control")), "{state:?}");
+    assert!(matches!(&state, MoveState::Refused(words) if words.contains("did not begin the move")), "{state:?}");
     assert_eq!(link.poll().unwrap(), state, "it stays as it ended");
     assert_eq!(go(&mut link, &GOAL_RAD).unwrap(), MoveState::Reached);
+}
+
+/// Polls for so long; the latest state.
+fn watch_for(link: &mut UrLink, time: Duration) -> MoveState {
+    let until = Instant::now() + time;
+    loop {
+        let state = link.poll().unwrap();
+        if Instant::now() >= until {
+            return state;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// So short beyond what a move takes that a slow one would not end in time.
+const HASTY: Patience = Patience {
+    answer: Duration::from_millis(800),
+    begin: Duration::from_millis(600),
+    stand: Duration::from_millis(250),
+    margin: Duration::from_millis(200),
+    recover: Duration::from_secs(3),
+};
+/// A second's way, for which 2.2 seconds are allowed at full speed.
+const SECOND: JointSpeed = JointSpeed { revolute_rad_s: 0.5, prismatic_m_s: 0.25 };
+
+#[test]
+fn a_move_may_take_as_long_as_the_speed_slider_makes_it() {
+    // Slider and limiter multiply; either may be what slows the robot down.
+    for (slider, limiter) in [(0.3, 1.0), (0.6, 0.5)] {
+        let peer = UrPeer::start(UrPeerOptions { pace: 1.0, ..UrPeerOptions::default() });
+        peer.set_speed(slider, limiter);
+        let mut link = UrLink::connect("127.0.0.1", peer.ports(), HASTY).unwrap();
+        let began = Instant::now();
+        link.start_move(&joint_vector(&GOAL_RAD), &SECOND).unwrap();
+        assert_eq!(end_of_move(&mut link).unwrap(), MoveState::Reached);
+        assert!(began.elapsed() > Duration::from_secs(3), "the slider is obeyed: {:?}", began.elapsed());
+    }
+}
+
+#[test]
+fn a_slider_at_zero_and_a_paused_program_are_waited_for() {
+    type Act = fn(&UrPeer);
+    let cases: [(&str, Act, Act); 2] = [
+        ("speed slider", |peer| peer.set_speed(0.0, 1.0), |peer| peer.set_speed(0.5, 1.0)),
+        ("paused", |peer| peer.set_paused(true), |peer| peer.set_paused(false)),
+    ];
+    for (what, hold, let_go) in cases {
+        let peer = UrPeer::start(UrPeerOptions { pace: 1.0, ..UrPeerOptions::default() });
+        let mut link = UrLink::connect("127.0.0.1", peer.ports(), HASTY).unwrap();
+        link.start_move(&joint_vector(&GOAL_RAD), &SECOND).unwrap();
+        watch_for(&mut link, Duration::from_millis(300));
+        hold(&peer);
+        let held = watch_for(&mut link, Duration::from_secs(3));
+        assert!(format!("{held:?}").contains(what), "said while it is held: {held:?}");
+        assert!(largest(&peer.joints().joints_at(Instant::now()), &GOAL_RAD) > 0.1);
+        let_go(&peer);
+        assert_eq!(watch_for(&mut link, Duration::from_millis(100)), MoveState::Moving);
+        assert_eq!(end_of_move(&mut link).unwrap(), MoveState::Reached);
+    }
+}
+
+#[test]
+fn a_controller_that_falls_silent_times_out_wherever_its_slider_is() {
+    let peer = UrPeer::start(UrPeerOptions { pace: 1.0, ..UrPeerOptions::default() });
+    peer.set_speed(0.5, 1.0);
+    let mut link = UrLink::connect("127.0.0.1", peer.ports(), HASTY).unwrap();
+    peer.next(Mishap::GoesSilent);
+    link.start_move(&joint_vector(&GOAL_RAD), &SECOND).unwrap();
+    watch_for(&mut link, Duration::from_millis(1500));
+    peer.set_speed(0.0, 1.0);
+    let state = end_of_move(&mut link).unwrap();
+    assert!(matches!(state, MoveState::TimedOut(_)), "{state:?}");
 }
 
 #[test]
 fn a_robot_that_cannot_move_is_refused_with_its_mode() {
     let peer = UrPeer::start(UrPeerOptions::default());
     let mut link = connect(&peer);
-    for (robot_mode, safety_mode, named) in
-        [(3, 1, "POWER_OFF"), (-1, 1, "NO_CONTROLLER"), (7, 7, "ROBOT_EMERGENCY_STOP"), (7, 99, "number 99")]
-    {
+    for (robot_mode, safety_mode, named) in [
+        (3, 1, "POWER_OFF"),
+        (-1, 1, "NO_CONTROLLER"),
+        (7, 7, "ROBOT_EMERGENCY_STOP"),
+        (7, 22, "SAFETY_API_SAFEGUARD_STOP"),
+        (7, 99, "number 99"),
+    ] {
         peer.set_modes(robot_mode, safety_mode);
         std::thread::sleep(std::time::Duration::from_millis(50));
         let state = go(&mut link, &GOAL_RAD).unwrap();
@@ -102,37 +171,6 @@ fn numbers_that_are_none_are_refused() {
     link.start_move(&joint_vector(&GOAL_RAD), &standstill).unwrap();
     assert!(matches!(link.poll().unwrap(), MoveState::Refused(_)));
     assert_eq!(peer.programs(), [""; 0]);
-}
-
-#[test]
-fn a_protective_stop_is_a_fault_and_is_recovered_from() {
-    let peer = UrPeer::start(UrPeerOptions::default());
-    let mut link = connect(&peer);
-    peer.next(Mishap::FaultsHalfWay);
-    let state = go(&mut link, &GOAL_RAD).unwrap();
-    assert!(matches!(state, MoveState::Fault(_)), "{state:?}");
-    assert!(words(state).contains("PROTECTIVE_STOP"));
-    let halted_rad = peer.joints().joints_at(Instant::now());
-    assert!(largest(&halted_rad, &GOAL_RAD) > 0.1);
-    // Before it is released, nothing moves.
-    let refused = go(&mut link, &GOAL_RAD).unwrap();
-    assert!(matches!(&refused, MoveState::Refused(words) if words.contains("PROTECTIVE_STOP")), "{refused:?}");
-    link.recover().unwrap();
-    assert_eq!(go(&mut link, &GOAL_RAD).unwrap(), MoveState::Reached);
-    assert_eq!(peer.problems(), [""; 0]);
-}
-
-#[test]
-fn what_the_dashboard_refuses_is_in_the_next_refusal() {
-    let peer = UrPeer::start(UrPeerOptions { pace: 1.0, ..UrPeerOptions::default() });
-    let mut link =
-        UrLink::connect("127.0.0.1", peer.ports(), Patience { recover: std::time::Duration::ZERO, ..patience() }).unwrap();
-    peer.next(Mishap::FaultsHalfWay);
-    link.start_move(&joint_vector(&GOAL_RAD), &JointSpeed { revolute_rad_s: 2.0, ..SPEED }).unwrap();
-    assert!(matches!(end_of_move(&mut link).unwrap(), MoveState::Fault(_)));
-    link.recover().unwrap();
-    let refused = go(&mut link, &GOAL_RAD).unwrap();
-    assert!(matches!(&refused, MoveState::Refused(words) if words.contains("inspect cause")), "{refused:?}");
 }
 
 #[test]

@@ -90,7 +90,7 @@ fn numbers_that_are_none_are_refused() {
 }
 
 #[test]
-fn an_envelope_error_on_the_way_is_a_fault_and_is_recovered_from() {
+fn an_envelope_error_on_the_way_is_a_fault_that_only_a_person_gets_over() {
     for prompts_at_end in [false, true] {
         // Slow enough that a WHERE sees it move.
         let peer = ValPeer::start(ValPeerOptions { pace: 4.0, prompts_at_end, ..ValPeerOptions::default() });
@@ -98,8 +98,20 @@ fn an_envelope_error_on_the_way_is_a_fault_and_is_recovered_from() {
         peer.next(Mishap::FaultsHalfWay);
         assert_eq!(go(&mut link, &GOAL_DEG).unwrap(), MoveState::Fault("*Envelope error* Jt 2".into()));
         assert!(distance_rad(&peer, &GOAL_DEG) > 0.1);
+        let typed = peer.lines().len();
         link.recover().unwrap();
+        assert_eq!(link.intervention().unwrap().unwrap().what, "*Envelope error* Jt 2");
+        assert_eq!(peer.lines().len(), typed, "nothing is typed to get over it: {:?}", peer.lines());
+        link.release().unwrap();
+        assert_eq!(peer.lines().len(), typed, "not even then: {:?}", peer.lines());
+        assert_eq!(link.intervention().unwrap(), None);
+        // Nobody has switched the power on.
+        assert_eq!(go(&mut link, &GOAL_DEG).unwrap(), MoveState::Refused("*Arm power off*".into()));
+        assert_eq!(link.intervention().unwrap().unwrap().what, "*Arm power off*");
+        peer.switch_power_on();
+        link.release().unwrap();
         assert_eq!(go(&mut link, &GOAL_DEG).unwrap(), MoveState::Reached);
+        assert_eq!(link.intervention().unwrap(), None);
     }
 }
 
