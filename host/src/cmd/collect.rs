@@ -45,7 +45,8 @@ use session_files::SessionFiles;
   host-cal collect /dev/ttyUSB0 --session today --robot-link file --dialect fanuc --fanuc-j23 -1 --robot-tool 3
 
 A session that has begun needs no --plan, --robot and --rig: the same command goes on where it ended, after a crash or another day.
-At every change of the bar the command waits for Enter. Keys at any time (with Enter, where it shows lines and no steady screen):
+At every change of the bar the command waits for Enter, and where the controller has stopped the robot by itself until somebody has looked
+at it. Keys at any time (with Enter, where it shows lines and no steady screen):
 e = erase the last pose, s = skip the next one, p = pause, r = resume, q = quit.")]
 pub(super) struct CollectArgs {
     #[command(flatten)]
@@ -99,7 +100,7 @@ pub(super) struct CollectArgs {
     /// Do not return to one pose of every shell
     #[arg(long)]
     no_repeat: bool,
-    /// Ask for nothing: what attaches the bar does it by itself
+    /// Ask for nothing: what attaches the bar does it by itself, and the run ends where a person has to look
     #[arg(long)]
     yes: bool,
     /// Temperature, kept with the session, degrees Celsius

@@ -7,7 +7,8 @@
 //! A selected program begins with a coincidence move (BCO) to its first goal, from wherever the robot stands. So the first goal is
 //! where it stands, `PTP $AXIS_ACT`, and the joints are looked at behind it.
 //!
-//! Sources: `docs/robots.md`, list of statements.
+//! Sources: `docs/robots.md`, list of statements. From memory, which no source at hand confirms:
+//! `$BASE=$NULLFRAME`, `DECL BOOL` in a program without a data list.
 
 use std::fmt::Write;
 

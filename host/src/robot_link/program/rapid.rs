@@ -9,7 +9,8 @@
 //! names but those of the module and of its routine are LOCAL. The head is that of S4 controllers, and lines end as on their disks;
 //! newer controllers still read both.
 //!
-//! Sources: `docs/robots.md`, list of statements.
+//! Sources: `docs/robots.md`, list of statements. From memory, which no source at hand confirms:
+//! that S4 controllers want the head, `TPWrite`, `Stop`, `EXIT`, `WaitTime\InPos`, names of 16 characters.
 
 use std::fmt::Write;
 

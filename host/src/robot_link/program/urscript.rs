@@ -3,7 +3,8 @@
 //! `movej` with joint angles is joint-interpolated, `v` is the leading joint's speed, and without `r` it stops at its end. A popup
 //! that blocks waits until somebody at the pendant has the program go on.
 //!
-//! Sources: `docs/robots.md`, list of statements.
+//! Sources: `docs/robots.md`, list of statements. From memory, which no source at hand confirms:
+//! that `norm` of one number is its absolute value.
 
 use std::fmt::Write;
 

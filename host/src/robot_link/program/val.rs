@@ -6,7 +6,9 @@
 //!
 //! Speeds are percent; the full speed is assumed as the link does.
 //!
-//! Sources: `docs/robots.md`, list of statements.
+//! Sources: `docs/robots.md`, list of statements. From memory, which no source at hand confirms:
+//! that VAL II has no local variables, `HERE`, `DECOMPOSE`, `BREAK`, `FINE ALWAYS`, `DELAY`, `TYPE`, `PAUSE`, `STOP`,
+//! `IF … GOTO`, `ABS`.
 
 use std::fmt::Write;
 
