@@ -245,7 +245,7 @@ impl Report for DemoReport {
         let (design, rig, fitted, other, calibrated) =
             (at("design.toml"), at("rig.toml"), at("poses-460.csv"), at("poses-610.csv"), at("calibrated.toml"));
         text += &format!(
-            "\nTry next (host-cal is target/release/host-cal, or on your path after `cargo install --path host`):\n  host-cal fit --robot {design} --rig {rig} {fitted}\n  host-cal validate --robot {calibrated} --rig {rig} {other}\n  \
+            "\nTry next (host-cal is target/release/host-cal, or on your path after `cargo install --path host/app`):\n  host-cal fit --robot {design} --rig {rig} {fitted}\n  host-cal validate --robot {calibrated} --rig {rig} {other}\n  \
              host-cal rank --robot {design} --rig {rig} {fitted} --pairings A:1\n  host-cal paper\n"
         );
         text
