@@ -4,9 +4,9 @@
 //! Run with `cargo bench -p ballbar-tests`. Quote ratios: times depend on the machine and what else it does.
 
 use ballbar::{Chain, FreeParameters, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Parameter};
+use ballbar_calib::identify::{Identifiability, LmOptions, solve};
 use ballbar_tests::experiment::Puma;
 use criterion::{Criterion, criterion_group, criterion_main};
-use host_cal::identify::{Identifiability, LmOptions, solve};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra_of_peer::{DMatrix, DVector, Dyn, Owned};
 

@@ -1,8 +1,9 @@
 //! Simulated experiments on a PUMA 560 for the tests of identification.
 
 use ballbar::Chain;
-use host_cal::files::{Dataset, PoseRow, Rig, Robot};
-use host_cal::simulate::Shells;
+use ballbar_calib::model::{Dataset, PoseRow, Rig, Robot};
+use ballbar_calib::simulate::Shells;
+use host_cal::files::{open_rig, open_robot};
 
 /// Design, truth and rig of the paper's experiment.
 pub struct Puma {
@@ -16,8 +17,8 @@ pub struct Puma {
 
 impl Default for Puma {
     fn default() -> Self {
-        let open = |name| Robot::open(name).expect("built in");
-        Self { design: open("puma560"), truth: open("puma560-optimised"), rig: Rig::open("triangles").expect("built in") }
+        let open = |name| open_robot(name).expect("built in");
+        Self { design: open("puma560"), truth: open("puma560-optimised"), rig: open_rig("triangles").expect("built in") }
     }
 }
 

@@ -5,7 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use ballbar::{Chain, JointKind, PARAMETERS_PER_JOINT};
-use host_cal::files::{Calibration, CalibrationVerdict, Robot};
+use ballbar_calib::model::{Calibration, CalibrationVerdict, Robot};
+use host_cal::files::{calibrated_toml, open_robot, parse_robot, robot_source};
 use nalgebra::Matrix4;
 use num_complex::Complex;
 
@@ -17,7 +18,8 @@ pub const HOSTILE_NAME: &str = "*/ --> \" ' <&> \\ ]]> ${x} \u{2028}- a: #{ =cmd
 
 /// Writes `calibrated.toml`: a built-in robot as a calibration leaves one, every parameter a little off its design, with a hostile name.
 pub fn write_calibrated(folder: &Path, design: &str) -> Robot {
-    let design = Robot::open(design).expect("a built-in robot");
+    let source = robot_source(design).expect("a built-in robot");
+    let design = parse_robot(&source).expect("a built-in robot");
     let mut parameters = design.chain.parameters().to_vec();
     for (i, value) in parameters.iter_mut().enumerate() {
         // A millimetre and 0.06 degrees, up and down.
@@ -37,14 +39,14 @@ pub fn write_calibrated(folder: &Path, design: &str) -> Robot {
         rms_mm: 0.1,
         held_out_rms_mm: None,
     };
-    let text = design.calibrated_toml(&chain, &calibration).expect("a robot's text");
+    let text = calibrated_toml(&source, &chain, &calibration).expect("a robot's text");
     // What JSON quotes TOML quotes alike.
     let name = serde_json::to_string(HOSTILE_NAME).expect("a text");
     let named = |line: &str| if line.starts_with("name =") { format!("name = {name}\n") } else { format!("{line}\n") };
     let text: String = text.lines().map(named).collect();
     let path = folder.join("calibrated.toml");
     fs::write(&path, text).expect("a file");
-    let robot = Robot::open(&path.display().to_string()).unwrap_or_else(|error| panic!("{error}"));
+    let robot = open_robot(&path.display().to_string()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(robot.name, HOSTILE_NAME);
     robot
 }

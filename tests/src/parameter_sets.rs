@@ -3,7 +3,7 @@
 use ballbar::wire::ParameterSet;
 use ballbar::{Coupling, Encoder, JointKind, LvdtCurve};
 use heapless::Vec;
-use host_cal::files::Robot;
+use host_cal::files::open_robot;
 
 /// Counts per joint radian of a PUMA 560 and counts per motor turn: gear ratios and encoders as its manual has them.
 const PUMA_ENCODERS: [(f32, u32); 6] =
@@ -11,7 +11,7 @@ const PUMA_ENCODERS: [(f32, u32); 6] =
 
 /// A PUMA 560 by its design, with the encoders of the interface board.
 pub fn puma() -> ParameterSet {
-    let chain = Robot::open("puma560").unwrap().chain.cast::<f32>();
+    let chain = open_robot("puma560").unwrap().chain.cast::<f32>();
     ParameterSet {
         name: "PUMA 560".try_into().unwrap(),
         is_calibrated: false,

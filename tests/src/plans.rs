@@ -1,9 +1,9 @@
 //! Plans, and the robots that they are made for, in the tests of planning.
 
 use ballbar::{Chain, Kinematics, Measurement, ParameterUnit};
-use host_cal::files::{PairingId, PlanRow, PoseRow, Rig, Robot};
-use host_cal::identify::{FitOptions, fit};
-use host_cal::plan::{Grid, Margins, Pace, Plan, PlanOptions, plan};
+use ballbar_calib::identify::{FitOptions, fit};
+use ballbar_calib::model::{PairingId, PoseRow, Rig, Robot};
+use ballbar_calib::plan::{Grid, Margins, Pace, Plan, PlanOptions, PlanRow, plan};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};

@@ -4,12 +4,13 @@ use std::fmt::Write;
 
 use ballbar::wire::{Answer, Command, Event, MAX_PAYLOAD, ParameterSet, StreamedPose, ToHost, WhichSet};
 use ballbar::{JointVector, Kinematics, Sample, SettledPose, Vector3};
+use ballbar_calib::model::Robot;
+use ballbar_calib::simulate::Shells;
 use ballbar_firmware::ENCODERS;
-use host_cal::board::{BAUD, BoardLink, parameter_set};
-use host_cal::files::{Rig, Robot};
+use host_cal::board::{BAUD, BoardLink, joint_encoders, parameter_set};
+use host_cal::files::{open_rig, open_robot};
 use host_cal::robot_link::JointSpeed;
 use host_cal::session::{LogReader, Record};
-use host_cal::simulate::Shells;
 use host_cal::units::mm_from_m;
 use host_cal::virtual_board::{Plant, Script};
 use serde_json::Value;
@@ -49,7 +50,7 @@ pub fn plant(seed: u64) -> Plant {
 
 /// So many stations on the shell of [`PAIRING`], without noise of their own.
 pub fn script(stations: usize, dwell_s: f64, seed: u64) -> Script {
-    let (robot, rig) = (robot(), Rig::open(RIG).expect("a built-in rig"));
+    let (robot, rig) = (robot(), open_rig(RIG).expect("a built-in rig"));
     let pairings = [rig.all_pairings()[0]];
     assert_eq!(rig.pairing_name(pairings[0]), PAIRING);
     let shells = Shells {
@@ -66,7 +67,7 @@ pub fn script(stations: usize, dwell_s: f64, seed: u64) -> Script {
 }
 
 fn robot() -> Robot {
-    Robot::open(ROBOT).expect("a built-in robot")
+    open_robot(ROBOT).expect("a built-in robot")
 }
 
 /// Runs a command against the bench's port that must end well; returns its JSON document.
@@ -166,7 +167,7 @@ pub fn make_ready(bench: &dyn Bench, plant: &Plant) {
 
 /// Homes the encoders of a robot that has not moved yet: it stands where the plant begins.
 pub fn home_at_rest(bench: &dyn Bench, plant: &Plant) {
-    let encoders = robot().joint_encoders().expect("the robot's encoders are known");
+    let encoders = joint_encoders(&robot()).expect("the robot's encoders are known");
     let q = encoders.q(plant.counts().map(f64::from));
     let mut text = String::new();
     for &q in &q.as_array()[..plant.joints()] {
@@ -271,7 +272,7 @@ impl Recording {
     /// `poses.csv` has the stations of the script in order: joint values to half a count, lengths to a step of the LVDT.
     pub fn has_true_stations(&self, script: &Script) {
         let robot = robot();
-        let (encoders, truth) = (robot.joint_encoders().expect("the encoders are known"), Kinematics::new(&robot.chain));
+        let (encoders, truth) = (joint_encoders(&robot).expect("the encoders are known"), Kinematics::new(&robot.chain));
         let text = std::fs::read_to_string(self.folder.path().join("poses.csv")).expect("the session has poses");
         let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
         assert_eq!(rows.len(), self.settled.len());
@@ -295,7 +296,7 @@ impl Recording {
     /// difference, metres.
     pub fn has_true_poses(&self, ticks: &[Tick]) -> f64 {
         let robot = robot();
-        let (encoders, truth) = (robot.joint_encoders().expect("the encoders are known"), Kinematics::new(&robot.chain));
+        let (encoders, truth) = (joint_encoders(&robot).expect("the encoders are known"), Kinematics::new(&robot.chain));
         let mut largest_m = 0_f64;
         for (index, streamed) in &self.poses {
             let tick = &ticks[*index as usize + 1];

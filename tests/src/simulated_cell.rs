@@ -5,12 +5,13 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use ballbar::StillnessCriteria;
+use ballbar_calib::model::{PairingId, Rig, Robot};
+use ballbar_calib::plan::{Cell, CheckedPlan, Grid, Margins, Pace as PlanPace, PlanOptions, PlanRow, plan};
 use host_cal::board::{BAUD, BoardLink, RobotOnBoard, parameter_set};
 use host_cal::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Ended, Guide, Ledger, Nearness, Operator, RowState, Summary,
 };
-use host_cal::files::{PairingId, PlanRow, Rig, Robot, Source, read_plan, write_plan};
-use host_cal::plan::{Cell, CheckedPlan, Grid, Margins, Pace as PlanPace, PlanOptions, plan};
+use host_cal::files::{Source, open_rig, open_robot, read_plan, write_plan};
 use host_cal::robot_link::RobotLink;
 use host_cal::robot_link::sim::{SimHand, SimLink};
 use host_cal::session::{Recorder, Run, SessionLock};
@@ -58,17 +59,17 @@ pub fn plan_text(poses_per_shell: usize, bars_m: &[f64], pairings: &[(usize, usi
 
 /// The design.
 pub fn design() -> Robot {
-    Robot::open(DESIGN).expect("a built-in robot")
+    open_robot(DESIGN).expect("a built-in robot")
 }
 
 /// The rig.
 pub fn rig() -> Rig {
-    Rig::open(RIG).expect("a built-in rig")
+    open_rig(RIG).expect("a built-in rig")
 }
 
 /// The robot as it is.
 pub fn truth() -> Robot {
-    Robot::open(TRUTH).expect("a built-in robot")
+    open_robot(TRUTH).expect("a built-in robot")
 }
 
 /// A plant of the true robot.

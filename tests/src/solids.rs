@@ -2,7 +2,7 @@
 //! shares no code with the planner.
 
 use ballbar::{Chain, JointKind};
-use host_cal::files::{PairingId, Rig, Robot};
+use ballbar_calib::model::{PairingId, Rig, Robot};
 use nalgebra::{Isometry3, Matrix4, Point3, Translation3, UnitQuaternion, Vector3};
 use parry3d_f64::math::{Pose, Rot3, Vector};
 use parry3d_f64::query;

@@ -1,4 +1,5 @@
-//! Calibration of a robot's kinematics from ball-bar lengths: the library behind the `host-cal` command.
+//! Calibration of a robot's kinematics from ball-bar lengths: what the `host-cal` command is made of. The computing itself is
+//! [`ballbar_calib`].
 //!
 //! | module | holds |
 //! | --- | --- |
@@ -7,15 +8,11 @@
 //! | [`collect`] | walks a plan: moves the robot, waits, measures, keeps |
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
-//! | [`identify`] | from poses to parameters: which ones the data can tell, the fit, its statistics |
-//! | [`assess`] | is a fit good? One answer, with its reasons, for whoever asks |
 //! | [`export`] | a robot in the formats of others, one file each |
-//! | [`kinematics`] | where every link stands, and from tool poses back to joint vectors |
-//! | [`plan`] | which poses to measure, and the way between them |
-//! | [`simulate`] | poses on hemispherical shells, simulated lengths, tool error over the workspace |
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
 //! | [`report`] | a calibration as a page for people: facts, figures, HTML |
+//! | [`remedies`] | what to do about the errors of the calibration library |
 //! | [`deadline`] | how long a whole answer may take |
 //! | `platform` | what differs between operating systems |
 //! | [`text`] | what comes from outside, as a terminal may show it |
@@ -25,23 +22,19 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests look at files from outside"))]
 
-pub mod assess;
 pub mod board;
 pub mod cmd;
 pub mod collect;
 pub mod deadline;
 pub mod export;
 pub mod files;
-pub mod identify;
-pub mod kinematics;
 pub mod paper;
-pub mod plan;
 mod platform;
+pub mod remedies;
 pub mod report;
 pub mod robot_link;
 #[expect(clippy::disallowed_methods, reason = "a session appends to its log, and reads its own files before it replaces them")]
 pub mod session;
-pub mod simulate;
 pub mod text;
 pub mod units;
 #[cfg(unix)]

@@ -7,7 +7,7 @@ use ballbar::{
 };
 use ballbar_tests::parameter_sets::{calibrated_puma, curve, largest, puma, two_joints};
 use host_cal::board::nominal_lvdt;
-use host_cal::files::Robot;
+use host_cal::files::open_robot;
 use proptest::prelude::*;
 
 const BUILT_IN: [&str; 6] = ["puma560", "puma560-optimised", "irb120", "ur5e", "stanford", "scara"];
@@ -80,7 +80,7 @@ fn assert_taken(chain: &Chain<f64>) {
 #[test]
 fn every_robot_that_is_built_in_and_every_set_of_the_tests_is_taken() {
     for name in BUILT_IN {
-        let chain = Robot::open(name).unwrap().chain;
+        let chain = open_robot(name).unwrap().chain;
         assert_taken(&chain);
         (0..50).for_each(|seed| assert_taken(&changed(&chain, seed)));
         for joint in (0..chain.joints()).filter(|&joint| chain.joint_kinds()[joint] == JointKind::Revolute) {
@@ -96,7 +96,7 @@ fn every_robot_that_is_built_in_and_every_set_of_the_tests_is_taken() {
 
 #[test]
 fn frames_that_were_slid_leave_the_robot_as_it_is() {
-    let near = Robot::open("ur5e").unwrap().chain;
+    let near = open_robot("ur5e").unwrap().chain;
     let far = slid(&slid(&near, 1, 574.0), 2, -507.0);
     let q = near.joint_vector(&[0.3, -1.1, 2.0, 0.4, -0.9, 1.7]).unwrap();
     let [near_m, far_m] = [&near, &far].map(|chain| Kinematics::new(chain).base_from_tool(&q).translation_m);
@@ -165,7 +165,7 @@ fn millimetres_that_were_taken_for_metres_are_refused_by_the_length_that_stands_
 #[test]
 fn only_poses_that_the_limits_allow_count_where_they_are_known() {
     // A slide that may go 300 m, and the usual metre of which makes sense.
-    let chain = Robot::open("stanford").unwrap().chain;
+    let chain = open_robot("stanford").unwrap().chain;
     let set = set_of(&chain);
     let mut ranges = set.usual_ranges();
     let slide = chain.joint_kinds().iter().position(|&kind| kind == JointKind::Prismatic).unwrap();

@@ -158,7 +158,7 @@ fn a_robot_that_is_driven_by_hand_is_followed() {
                 Event::Attach(bar) => {
                     self.wait();
                     let (chuck, sphere) = (rig.chuck(&bar.chuck).unwrap(), rig.sphere(&bar.sphere).unwrap());
-                    let pairing = rig.pairing(host_cal::files::PairingId { chuck, sphere });
+                    let pairing = rig.pairing(ballbar_calib::model::PairingId { chuck, sphere });
                     let bar = host_cal::virtual_board::AttachedBar { pairing, mid_m: bar.bar_m };
                     self.give(Order::Attach { bar, length_error_m: 0.0 });
                 }

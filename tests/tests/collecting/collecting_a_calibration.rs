@@ -1,10 +1,11 @@
 //! A whole calibration by the command, from the plan to the proof on another bar, of a robot with the flaws of one of metal.
 #![cfg(unix)]
 
+use ballbar_calib::model::Robot;
+use ballbar_calib::simulate::tool_error;
 use ballbar_tests::command::{Run, host_cal_in};
 use ballbar_tests::simulated_cell::{DESIGN, RIG, SimulatedCell, design, plant, truth};
-use host_cal::files::Robot;
-use host_cal::simulate::tool_error;
+use host_cal::files::open_robot;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -60,7 +61,7 @@ fn a_planned_and_collected_calibration_is_as_good_as_the_papers() {
     let unseen = good(cell.host_cal(&validate));
     assert_eq!((&unseen["poses"], &unseen["held_out"]), (&POSES_PER_BAR.into(), &"bar=610".into()));
     let unseen_mm = number(&unseen, "rms_mm");
-    let calibrated = Robot::open(&cell.path("calibrated.toml").display().to_string()).unwrap();
+    let calibrated = open_robot(&cell.path("calibrated.toml").display().to_string()).unwrap();
     let (design_mm, tool_mm) = (tool_error_mm(&design()), tool_error_mm(&calibrated));
     println!(
         "RMS {before_mm:.3} mm before, {after_mm:.4} after, {unseen_mm:.4} on 61 cm; tool {design_mm:.2} mm, then {tool_mm:.3}"

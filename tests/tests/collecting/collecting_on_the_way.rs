@@ -3,10 +3,11 @@
 
 use std::time::Duration;
 
+use ballbar_calib::identify::{FitOptions, fit};
+use ballbar_calib::model::Dataset;
+use ballbar_calib::simulate::tool_error;
 use ballbar_tests::simulated_cell::{SimulatedCell, column, controller, design, plan_text, plant, rig, truth};
-use host_cal::files::Dataset;
-use host_cal::identify::{FitOptions, fit};
-use host_cal::simulate::tool_error;
+use host_cal::files::read_poses;
 use host_cal::virtual_board::ControllerOptions;
 use serde_json::Value;
 
@@ -45,7 +46,7 @@ fn collect(plan: &str, dwell_s: f64, more: &[&str]) -> Way {
     assert_eq!(run.code, 0, "{}", run.transcript());
     let report = run.json();
     assert_eq!((&report["measured"], &report["losses"]["missing"]), (&report["planned"], &0.into()));
-    let poses = Dataset::read([cell.path("session/poses.csv").as_path()], &design(), &rig()).unwrap();
+    let poses = read_poses([cell.path("session/poses.csv").as_path()], &design(), &rig()).unwrap();
     Way { cell, report, poses, robot_s }
 }
 

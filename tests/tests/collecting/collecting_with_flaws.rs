@@ -283,7 +283,7 @@ fn an_arm_that_was_moved_during_a_pause_is_brought_back() {
     struct Jogs {
         crew: Crew,
         link: SimLink,
-        rows: Vec<host_cal::files::PlanRow>,
+        rows: Vec<ballbar_calib::plan::PlanRow>,
         is_jogged: bool,
     }
     impl Operator for Jogs {

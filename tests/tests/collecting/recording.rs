@@ -6,13 +6,13 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{Event, Stream, ToHost};
+use ballbar_calib::simulate::Shells;
 use ballbar_tests::command::{Run, host_cal_command, host_cal_in};
 use ballbar_tests::readers::{is_skipped, python};
 use host_cal::board::parameter_set;
-use host_cal::files::{Rig, Robot};
+use host_cal::files::{open_rig, open_robot};
 use host_cal::robot_link::JointSpeed;
 use host_cal::session::{Description, LogReader, Record};
-use host_cal::simulate::Shells;
 use host_cal::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
 use tempfile::TempDir;
 
@@ -26,8 +26,8 @@ fn board(folder: &Path, poses: usize) -> VirtualBoard {
 }
 
 fn board_with(folder: &Path, poses: usize, is_homed: bool) -> VirtualBoard {
-    let (truth, design) = (Robot::open("puma560-optimised").unwrap(), Robot::open("puma560").unwrap());
-    let rig = Rig::open("triangles").unwrap();
+    let (truth, design) = (open_robot("puma560-optimised").unwrap(), open_robot("puma560").unwrap());
+    let rig = open_rig("triangles").unwrap();
     let pairings = rig.all_pairings();
     let shells = Shells {
         planned_with: &design,
@@ -204,7 +204,7 @@ fn a_board_with_other_parameters_ends_the_recording() {
     let recording = start(folder, &[&["stream", "port", "--session", "s", "--json"], &PAIRING[..]].concat());
     wait_for("the first pose", || lines_of(&session.join("poses.csv")) >= 2);
     drop(first);
-    let plant = Plant::new(&Robot::open("puma560-optimised").unwrap(), 0.075, 7).unwrap();
+    let plant = Plant::new(&open_robot("puma560-optimised").unwrap(), 0.075, 7).unwrap();
     let port_name = Some(folder.join("port"));
     let _bare = VirtualBoard::start(VirtualBoardOptions { port_name, ..VirtualBoardOptions::new(plant, Pace::Real) }).unwrap();
     let run = finish(recording);

@@ -4,10 +4,11 @@
 
 use std::fs;
 
+use ballbar_calib::model::Robot;
 use ballbar_tests::simulated_cell::{SHORT_PLAN, design, plant};
 use ballbar_tests::workbench::{Workbench, snapshot};
 use host_cal::board::parameter_set;
-use host_cal::files::{RIGS, ROBOTS, Robot};
+use host_cal::files::{RIGS, ROBOTS};
 use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions};
 
 /// Nobody listens at the port of this number.

@@ -3,10 +3,11 @@
 #![cfg(unix)]
 
 use ballbar::{JointKind, JointVector};
+use ballbar_calib::model::{Rig, Robot};
+use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace};
 use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, TRAVEL_M, design, plant, rig};
 use host_cal::collect::{ProgramOptions, plan_programs};
-use host_cal::files::{Rig, Robot, Source, read_plan};
-use host_cal::plan::{Cell, CheckedPlan, Margins, Pace};
+use host_cal::files::{Source, read_plan};
 use host_cal::robot_link::JointSpeed;
 use host_cal::robot_link::program::{
     ControllerSetup, Dialect, Program, ProgramError, ProgramFile, ProgramStep, START_TOLERANCE_DEG, START_TOLERANCE_MM,
@@ -272,7 +273,7 @@ fn the_programs_of_a_plan_can_all_be_loaded() {
     }
     let measured: Vec<_> =
         programs.iter().flat_map(|program| &program.steps).filter(|step| step.is_measured).map(|step| step.q).collect();
-    let planned: Vec<_> = rows.iter().filter(|row| row.kind == host_cal::files::RowKind::Measure).map(|row| row.q).collect();
+    let planned: Vec<_> = rows.iter().filter(|row| row.kind == ballbar_calib::plan::RowKind::Measure).map(|row| row.q).collect();
     assert_eq!(measured, planned);
     for shell in &shells {
         assert!(shell.approach.steps.iter().all(|step| !step.is_measured) && shell.approach.before.contains("OFF"));

@@ -13,7 +13,7 @@ use ballbar::wire::{
 use ballbar::{JointKind, JointVector, LvdtReading, Sample, SettledPose, StillnessCriteria};
 use ballbar_tests::command::host_cal_in;
 use host_cal::board::{RobotOnBoard, nominal_lvdt, parameter_set};
-use host_cal::files::Robot;
+use host_cal::files::open_robot;
 use host_cal::session::{Connection, MeasuredPose, Recorder, Run, SessionLock, SettledFate, SettledRule, recover};
 use tempfile::TempDir;
 
@@ -74,7 +74,7 @@ fn hello() -> BoardHello {
 
 impl Recording {
     fn new() -> Self {
-        let set = parameter_set(&Robot::open("puma560").unwrap(), nominal_lvdt(0.075)).unwrap();
+        let set = parameter_set(&open_robot("puma560").unwrap(), nominal_lvdt(0.075)).unwrap();
         let robot = RobotOnBoard::new(set.clone()).unwrap();
         let (folder, rule) = (TempDir::new().unwrap(), SettledRule::new(StillnessCriteria::default()));
         let (states, poses, erased) = (Vec::new(), Vec::new(), Vec::new());

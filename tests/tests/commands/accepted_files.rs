@@ -4,6 +4,7 @@ use std::fs;
 
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::shells::{DESIGN, puma, runs};
+use host_cal::files::{append_poses, parse_rig, parse_robot};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -170,8 +171,9 @@ fn the_examples_of_the_documentation_are_files_that_are_read() {
         blocks.iter().filter_map(|block| block.strip_prefix(language)).nth(n).expect("a block of this language")
     };
     let source = |text: &str| host_cal::files::Source::new("docs/files.md", text);
-    let robot = host_cal::files::Robot::parse(&source(block("toml\n", 0))).expect("the robot");
-    let rig = host_cal::files::Rig::parse(&source(block("toml\n", 1))).expect("the rig");
+    let robot = parse_robot(&source(block("toml\n", 0))).expect("the robot");
+    let rig = parse_rig(&source(block("toml\n", 1))).expect("the rig");
     assert_eq!((robot.chain.joints(), rig.chucks.len(), rig.spheres.len()), (2, 1, 1));
-    host_cal::files::Dataset::default().append(&source(block("csv\n", 0)), &robot, &rig).expect("the poses");
+    let mut poses = ballbar_calib::model::Dataset::default();
+    append_poses(&mut poses, &source(block("csv\n", 0)), &robot, &rig).expect("the poses");
 }

@@ -1,11 +1,11 @@
 //! D-optimal poses, and the noise that a plan says will reach the tool.
 
 use ballbar::Measurement;
+use ballbar_calib::identify::{FitOptions, Hold, fit};
+use ballbar_calib::model::PoseRow;
+use ballbar_calib::plan::{Cell, Expectation, Margins, Pace, Quality, d_optimal};
+use ballbar_calib::simulate::tool_error;
 use ballbar_tests::experiment::{Puma, dataset};
-use host_cal::files::PoseRow;
-use host_cal::identify::{FitOptions, fit};
-use host_cal::plan::{Cell, Expectation, Margins, Pace, Quality, d_optimal};
-use host_cal::simulate::tool_error;
 use rand::SeedableRng;
 use rand::seq::index::sample;
 use rand_chacha::ChaCha8Rng;
@@ -38,7 +38,7 @@ fn recovered_m(puma: &Puma, pool: &Pool, chosen: &[usize], fits: u64) -> f64 {
         let noise = Normal::new(0.0, SIGMA_M).unwrap();
         let mut rows: Vec<PoseRow> = chosen.iter().map(|&i| pool.poses[i].clone()).collect();
         rows.iter_mut().for_each(|row| row.measurement.length_m += noise.sample(&mut rng));
-        let hold = FitOptions { hold: "paper".parse().unwrap(), ..FitOptions::default() };
+        let hold = FitOptions { hold: Hold::paper(), ..FitOptions::default() };
         let found = fit(&puma.design, &dataset(rows), &hold).unwrap();
         tool_error(&puma.truth.chain, &found.solution.chain, &puma.truth.limits, 300, seed).rms_m.powi(2)
     };

@@ -13,7 +13,7 @@ use ballbar::wire::{
 };
 use ballbar_tests::command::{Run, host_cal_in};
 use host_cal::board::{BAUD, BoardLink, Port, RobotOnBoard, nominal_lvdt, parameter_set};
-use host_cal::files::{Rig, Robot};
+use host_cal::files::{open_rig, open_robot};
 use host_cal::robot_link::JointSpeed;
 use host_cal::virtual_board::{AttachedBar, Pace, Plant, Script, Station, VirtualBoard, VirtualBoardOptions};
 use serialport::SerialPort;
@@ -21,7 +21,7 @@ use tempfile::TempDir;
 
 /// A board at `port` in the folder, with nothing in flash and nothing homed.
 fn bare_board(folder: &Path) -> VirtualBoard {
-    let plant = Plant::new(&Robot::open("puma560-optimised").unwrap(), 0.075, 7).unwrap();
+    let plant = Plant::new(&open_robot("puma560-optimised").unwrap(), 0.075, 7).unwrap();
     let port_name = Some(folder.join("port"));
     VirtualBoard::start(VirtualBoardOptions { port_name, ..VirtualBoardOptions::new(plant, Pace::Real) }).unwrap()
 }
@@ -223,8 +223,8 @@ fn home_and_pose_refuse_a_board_without_parameters_and_wrong_joint_values() {
 fn lvdt_finds_the_curve_of_the_simulated_lvdt_from_known_lengths() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
-    let truth = Robot::open("puma560-optimised").unwrap();
-    let rig = Rig::open("triangles").unwrap();
+    let truth = open_robot("puma560-optimised").unwrap();
+    let rig = open_rig("triangles").unwrap();
     let plant = Plant::new(&truth, 0.075, 7).unwrap();
     let true_curve = plant.lvdt();
     let parameters = Some(parameter_set(&truth, nominal_lvdt(0.075)).unwrap());

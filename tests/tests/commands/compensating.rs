@@ -2,17 +2,18 @@
 
 use std::fs;
 
+use ballbar_calib::kinematics::{Compensation, Compensator, Goal, Unreached};
+use ballbar_calib::model::{JointLimits, Robot};
 use ballbar_tests::command::{Run, host_cal_in};
 use ballbar_tests::exports::{joint_vectors, pose_by_products, write_calibrated};
-use host_cal::files::{Goal, JointLimits, ROBOTS, Robot, Source, Target, UrdfEnds, parse_urdf, read_targets};
-use host_cal::kinematics::{Compensation, Compensator, Unreached};
+use host_cal::files::{ROBOTS, Source, Target, UrdfEnds, open_robot, parse_robot, parse_urdf, pose_as_written, read_targets};
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use tempfile::TempDir;
 
 /// A built-in robot and what calibration makes of it.
 fn robots(design: &str) -> (Robot, Robot) {
     let folder = TempDir::new().expect("a temporary folder");
-    (write_calibrated(folder.path(), design), Robot::open(design).expect("a built-in robot"))
+    (write_calibrated(folder.path(), design), open_robot(design).expect("a built-in robot"))
 }
 
 fn targets(text: &str, nominal: &Robot) -> Vec<Target> {
@@ -24,7 +25,7 @@ fn commands(real: &Robot, nominal: &Robot, text: &str) -> Vec<Result<Compensatio
     let compensator = Compensator::new(real, nominal).expect("limits in common");
     let mut before = compensator.middle();
     let mut command = |target: &Target| {
-        let found = compensator.compensate(&target.goal, &before, |q| q);
+        let found = compensator.compensate(&target.goal, &before, |q| q, pose_as_written);
         if let Ok(found) = &found {
             before = found.nominal_q;
         }
@@ -92,7 +93,7 @@ fn a_controller_that_takes_poses_gets_one_that_its_own_inverse_turns_into_the_co
     // The controller: its model's inverse, near where it would have been.
     let controller = Compensator::new(&nominal, &nominal).expect("limits in common");
     let goal = Goal::Pose(found.nominal_base_from_tool, Some(found.nominal_q));
-    let theirs = controller.compensate(&goal, &found.nominal_q, |q| q).unwrap();
+    let theirs = controller.compensate(&goal, &found.nominal_q, |q| q, pose_as_written).unwrap();
     let off = theirs.q.as_array().iter().zip(found.q.as_array()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(off < 1e-8, "{off:e}");
 }
@@ -158,8 +159,8 @@ fn an_arm_with_a_joint_to_spare_stays_near_where_it_is() {
 #[test]
 fn an_arm_shorter_than_its_design_does_not_reach_as_far() {
     let (_, text) = ROBOTS.iter().find(|(name, _)| *name == "ur5e").expect("a built-in robot");
-    let nominal = Robot::open("ur5e").expect("a built-in robot");
-    let shorter = Robot::parse(&Source::new("shorter", &text.replace("-425.0", "-424.0"))).expect("a robot");
+    let nominal = open_robot("ur5e").expect("a built-in robot");
+    let shorter = parse_robot(&Source::new("shorter", &text.replace("-425.0", "-424.0"))).expect("a robot");
     let stretched = format!("{JOINTS}0,-90,0,-90,0,0\n0,-90,30,-90,60,0\n");
     let found = commands(&shorter, &nominal, &stretched);
     assert_eq!(found[0], Err(Unreached::ByCalibrated));
@@ -173,7 +174,7 @@ fn with_third_joint(folder: &TempDir, min_deg: &str, max_deg: &str) {
     let text = fs::read_to_string(&path).expect("a file");
     let narrowed = text.replacen("min_deg = -45.0", &format!("min_deg = {min_deg}"), 1);
     let narrowed = narrowed.replacen("max_deg = 225.0", &format!("max_deg = {max_deg}"), 1);
-    assert!(Robot::parse(&Source::new("narrowed", &narrowed)).expect("a robot").limits[2].min.to_degrees() > -40.0, "{text}");
+    assert!(parse_robot(&Source::new("narrowed", &narrowed)).expect("a robot").limits[2].min.to_degrees() > -40.0, "{text}");
     fs::write(&path, narrowed).expect("a file");
 }
 
@@ -205,7 +206,7 @@ fn robots_that_allow_nothing_in_common_are_refused_by_the_joint() {
 
 #[test]
 fn a_joint_that_can_hardly_move_is_no_trouble() {
-    let mut robot = Robot::open("ur5e").expect("a built-in robot");
+    let mut robot = open_robot("ur5e").expect("a built-in robot");
     let min = 10.0_f64.to_radians();
     robot.limits[2] = JointLimits { min, max: min.next_up() };
     let found = commands(&robot, &robot, &format!("{POSE}500,150,600,0,90,0\n"))[0];

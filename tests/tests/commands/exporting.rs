@@ -4,10 +4,11 @@ use std::f64::consts::PI;
 use std::fs;
 
 use ballbar::JointKind;
+use ballbar_calib::kinematics::{Convention, DhTable};
+use ballbar_calib::model::Robot;
 use ballbar_tests::exports::{HOSTILE_NAME, joint_vectors, pose_by_products as pose};
 use host_cal::export::{Format, JointZero, export};
-use host_cal::files::{Imported, ROBOTS, Robot, Source, UrdfEnds, read_urdf};
-use host_cal::kinematics::{Convention, DhTable};
+use host_cal::files::{Imported, ROBOTS, Source, UrdfEnds, open_robot, parse_robot, read_urdf};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -39,7 +40,7 @@ fn robots() -> impl Strategy<Value = Robot> {
             text += &format!("[[joints]]\ntype = \"{kind}\"\noffset_{unit} = {offset:?}\nscale = {scale:?}\n");
             text += &format!("min_{unit} = {min:?}\nmax_{unit} = {max:?}\n");
         }
-        Robot::parse(&Source::new("any", &text)).unwrap()
+        parse_robot(&Source::new("any", &text)).unwrap()
     })
 }
 
@@ -89,7 +90,7 @@ proptest! {
 #[test]
 fn the_built_in_robots_survive_a_urdf_and_both_tables() {
     for (name, _) in ROBOTS {
-        let robot = Robot::open(name).unwrap();
+        let robot = open_robot(name).unwrap();
         survives_urdf(&robot);
         for convention in [Convention::Standard, Convention::Modified] {
             let (off_m, turned_rad) = DhTable::new(&robot.chain, convention).largest_difference(&robot.chain, &robot.limits);
@@ -100,7 +101,7 @@ fn the_built_in_robots_survive_a_urdf_and_both_tables() {
 
 #[test]
 fn the_table_of_the_ur5e_is_the_one_that_its_maker_publishes() {
-    let robot = Robot::open("ur5e").unwrap();
+    let robot = open_robot("ur5e").unwrap();
     let table = DhTable::new(&robot.chain, Convention::Standard);
     // Universal Robots, "DH Parameters for calculations of kinematics and dynamics": metres, theta zero.
     let (a, d) = ([0.0, -0.425, -0.3922, 0.0, 0.0, 0.0], [0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996]);
@@ -116,17 +117,17 @@ fn the_table_of_the_ur5e_is_the_one_that_its_maker_publishes() {
 
 #[test]
 fn nearly_parallel_axes_are_explained() {
-    let optimised = export(&Robot::open("puma560-optimised").unwrap(), Format::Dh, JointZero::Model).unwrap();
+    let optimised = export(&open_robot("puma560-optimised").unwrap(), Format::Dh, JointZero::Model).unwrap();
     assert!(
         optimised.remarks.iter().any(|remark| remark.contains("axes 2 and 3") && remark.contains("no fault")),
         "{optimised:?}"
     );
-    assert!(export(&Robot::open("puma560").unwrap(), Format::Dh, JointZero::Model).unwrap().remarks.is_empty());
+    assert!(export(&open_robot("puma560").unwrap(), Format::Dh, JointZero::Model).unwrap().remarks.is_empty());
 }
 
 #[test]
 fn a_name_that_no_reader_takes_is_cut_between_letters_and_that_is_said() {
-    let mut robot = Robot::open("ur5e").unwrap();
+    let mut robot = open_robot("ur5e").unwrap();
     robot.name = "a".to_owned() + &"é".repeat(150);
     let exported = export(&robot, Format::Urdf, JointZero::Model).unwrap();
     assert!(exported.remarks.iter().any(|remark| remark.contains("longer than the 200 bytes")), "{:?}", exported.remarks);
@@ -142,7 +143,7 @@ fn nearly_parallel(kinds: &str) -> Robot {
         _ => "[[joints]]\ntype = \"revolute\"\noffset_deg = 5.0\nscale = 1.0\nmin_deg = -170.0\nmax_deg = 170.0\n",
     };
     let joints: String = kinds.chars().map(joint).collect();
-    Robot::parse(&Source::new(kinds, &(link.repeat(kinds.len() + 1) + &joints))).unwrap()
+    parse_robot(&Source::new(kinds, &(link.repeat(kinds.len() + 1) + &joints))).unwrap()
 }
 
 #[test]
@@ -166,7 +167,7 @@ fn parameters_as_csv_are_the_numbers_of_the_robot_file() {
     for (name, text) in ROBOTS {
         let words = text.split(|c: char| !(c.is_ascii_digit() || "+-.e".contains(c)));
         let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
-        let csv = export(&Robot::open(name).unwrap(), Format::Csv, JointZero::Model).unwrap().text;
+        let csv = export(&open_robot(name).unwrap(), Format::Csv, JointZero::Model).unwrap().text;
         for line in csv.lines().skip_while(|line| *line != "parameter,unit,value").skip(1) {
             let value: f64 = line.rsplit(',').next().unwrap().parse().unwrap();
             assert!(numbers.contains(&value), "{name}: {line}");

@@ -5,10 +5,11 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use ballbar_calib::model::Robot;
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::exports::{joint_vectors, pose_by_command, write_calibrated};
 use ballbar_tests::readers::{is_skipped, octave, output, python, reader};
-use host_cal::files::{ROBOTS, Robot};
+use host_cal::files::{ROBOTS, open_robot};
 use nalgebra::Matrix4;
 use tempfile::TempDir;
 
@@ -58,7 +59,7 @@ impl Bench {
         assert_eq!(theirs.len(), self.poses.len(), "{what}");
         for (q, (ours, theirs)) in self.joints.iter().zip(self.poses.iter().zip(theirs)) {
             let off = (ours - theirs).amax();
-            assert!(off < tolerance, "{what} of {:?}: {off:e} at {q:?}\n{ours}{theirs}", self.robot.source_name());
+            assert!(off < tolerance, "{what} of {:?}: {off:e} at {q:?}\n{ours}{theirs}", self.robot.source.as_str());
         }
     }
 }
@@ -199,7 +200,7 @@ fn imported_descriptions_have_the_kinematics_that_pythons_parser_finds() {
         let arguments = ["import", &urdf_name, "--base", base, "--tip", tip, "--out", "imported.toml"];
         let run = host_cal_in(folder.path(), &arguments);
         assert_eq!(run.code, 0, "{}", run.transcript());
-        let robot = Robot::open(&folder.path().join("imported.toml").display().to_string()).expect("a robot");
+        let robot = open_robot(&folder.path().join("imported.toml").display().to_string()).expect("a robot");
         let joints = joint_vectors(&robot, 5);
         let joints_path = folder.path().join("joints.json");
         fs::write(&joints_path, serde_json::to_string(&joints).expect("JSON")).expect("a file");

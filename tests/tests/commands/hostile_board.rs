@@ -9,22 +9,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{Answer, BoardHello, Event, MAX_FRAME, PROTOCOL, ResetReason, Stream, ToHost, encode};
+use ballbar_calib::simulate::Shells;
 use ballbar_tests::command::{Run, host_cal_command, host_cal_in};
 use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, plant};
 use ballbar_tests::tampered_line::TamperedLine;
 use ballbar_tests::terminal::AtTerminal;
 use host_cal::board::parameter_set;
-use host_cal::files::{Rig, Robot};
+use host_cal::files::{open_rig, open_robot};
 use host_cal::robot_link::JointSpeed;
-use host_cal::simulate::Shells;
 use host_cal::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
 use serialport::{SerialPort, TTYPort};
 use tempfile::TempDir;
 
 /// A board that is ready, and whose robot visits so many poses as soon as a host streams.
 fn board(poses: usize) -> VirtualBoard {
-    let (truth, design) = (Robot::open("puma560-optimised").unwrap(), Robot::open("puma560").unwrap());
-    let rig = Rig::open("triangles").unwrap();
+    let (truth, design) = (open_robot("puma560-optimised").unwrap(), open_robot("puma560").unwrap());
+    let rig = open_rig("triangles").unwrap();
     let pairings = rig.all_pairings();
     let shells = Shells {
         planned_with: &design,

@@ -1,8 +1,9 @@
 //! Files with bytes changed at random: a reader takes them or says what is wrong, and never panics.
 
+use ballbar_calib::model::{Calibration, CalibrationVerdict, Dataset, Rig, Robot};
 use ballbar_tests::workbench::{POSES, RIG, ROBOT, Workbench};
 use host_cal::files::{
-    Calibration, CalibrationVerdict, Dataset, InputError, Rig, Robot, Source, UrdfEnds, parse_urdf, read_targets, write_poses,
+    InputError, Source, UrdfEnds, append_poses, calibrated_toml, parse_rig, parse_robot, parse_urdf, read_targets, write_poses,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -87,7 +88,7 @@ fn read_mutants<T>(text: &str, read: impl Fn(&Source) -> Result<T, InputError>, 
 
 fn good() -> (Robot, Rig) {
     let source = |text| Source::new("good", text);
-    (Robot::parse(&source(ROBOT)).expect("a good robot"), Rig::parse(&source(RIG)).expect("a good rig"))
+    (parse_robot(&source(ROBOT)).expect("a good robot"), parse_rig(&source(RIG)).expect("a good rig"))
 }
 
 /// A good file of poses with every optional column.
@@ -114,18 +115,18 @@ fn a_mutant_of_a_robot_is_refused_or_has_sound_numbers_that_survive_a_rewrite() 
         rms_mm: 0.25,
         held_out_rms_mm: None,
     };
-    let is_sound = |robot: &Robot| {
+    let is_sound = |(source, robot): &(Source, Robot)| {
         assert!(robot.chain.parameters().iter().all(|value| value.is_finite()));
         assert_eq!((robot.limits.len(), robot.encoders.len()), (robot.chain.joints(), robot.chain.joints()));
         assert!(robot.limits.iter().all(|limits| limits.min < limits.max));
-        let text = robot.calibrated_toml(&robot.chain, &calibration).expect("a file that was read can be edited");
-        let again = Robot::parse(&Source::new("rewritten", &text)).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let text = calibrated_toml(source, &robot.chain, &calibration).expect("a file that was read can be edited");
+        let again = parse_robot(&Source::new("rewritten", &text)).unwrap_or_else(|error| panic!("{error}\n{text}"));
         for (before, after) in robot.chain.parameters().iter().zip(again.chain.parameters()) {
             assert!((before - after).abs() <= 1e-12 * before.abs(), "{before} became {after}\n{text}");
         }
         assert_eq!(again.calibration.as_ref(), Some(&calibration));
     };
-    let taken = read_mutants(ROBOT, Robot::parse, is_sound);
+    let taken = read_mutants(ROBOT, |source| Ok((source.clone(), parse_robot(source)?)), is_sound);
     assert!((MUTANTS / 20..MUTANTS * 3 / 4).contains(&taken), "{taken} robots taken: the mutants are too mild or too wild");
 }
 
@@ -141,7 +142,7 @@ fn a_mutant_of_a_rig_is_refused_or_has_points_with_names() {
         }
         assert!(rig.bar.as_ref().is_none_or(|bar| bar.travel_m > 0.0 && bar.lengths_m.iter().all(|&length| length > 0.0)));
     };
-    let taken = read_mutants(RIG, Rig::parse, is_sound);
+    let taken = read_mutants(RIG, parse_rig, is_sound);
     assert!((MUTANTS / 20..MUTANTS * 3 / 4).contains(&taken), "{taken} rigs taken: the mutants are too mild or too wild");
 }
 
@@ -150,7 +151,7 @@ fn a_mutant_of_poses_is_refused_or_has_sound_rows_that_can_be_written_and_read_a
     let (robot, rig) = good();
     let read = |source: &Source| {
         let mut dataset = Dataset::default();
-        dataset.append(source, &robot, &rig)?;
+        append_poses(&mut dataset, source, &robot, &rig)?;
         Ok(dataset)
     };
     let is_sound = |dataset: &Dataset| {
@@ -183,7 +184,7 @@ fn a_mutant_of_a_urdf_is_refused_or_becomes_a_robot_file() {
     let ends = UrdfEnds { base: None, tip: Some("gripper") };
     let read = |source: &Source| parse_urdf(source, ends);
     let is_sound = |imported: &host_cal::files::Imported| {
-        let again = Robot::parse(&Source::new("imported", &imported.toml)).unwrap_or_else(|error| panic!("{error}"));
+        let again = parse_robot(&Source::new("imported", &imported.toml)).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(again.chain.parameters(), imported.robot.chain.parameters());
         assert!(again.limits.iter().all(|limits| limits.min < limits.max));
     };
@@ -239,7 +240,7 @@ fn a_robots_name_is_a_line_of_a_screen_and_a_file_of_no_end_is_not_read_to_it() 
         assert!(run.code == 2 && said.contains(says) && said.len() < 2_000, "{says}: {}", run.transcript());
         assert!(!run.stderr.contains('\u{1b}'), "{:?}", run.stderr);
     }
-    assert!(Robot::parse(&Source::new("robot", &text("\"\u{2028} é\""))).is_ok());
+    assert!(parse_robot(&Source::new("robot", &text("\"\u{2028} é\""))).is_ok());
     #[cfg(unix)]
     for arguments in
         [&["fk", "--robot", "/dev/zero", "--q", "0,0"][..], &["compensate", "--robot", "ur5e", "--nominal", "ur5e", "/dev/zero"]]
@@ -257,7 +258,8 @@ fn a_set_that_needs_quotes_is_written_with_them() {
         let text = format!("set,chuck,sphere,q1_deg,q2_mm,length_mm\n\"{quoted}\",A,1,10.0,100.0,455.5\n");
         let read = |text: &str| {
             let mut dataset = Dataset::default();
-            dataset.append(&Source::new("poses.csv", text), &robot, &rig).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            append_poses(&mut dataset, &Source::new("poses.csv", text), &robot, &rig)
+                .unwrap_or_else(|error| panic!("{error}\n{text}"));
             dataset
         };
         let again = read(&write_poses(&robot, &rig, &read(&text).rows));
@@ -272,7 +274,7 @@ fn weights_stay_finite_however_small_or_large_sigma_is() {
         let rows = format!("A,1,10.0,100.0,455.5,{sigma}\nA,1,11.0,100.0,455.5,0.1\n");
         let source = Source::new("poses.csv", &format!("chuck,sphere,q1_deg,q2_mm,length_mm,sigma_mm\n{rows}"));
         let mut dataset = Dataset::default();
-        if dataset.append(&source, &robot, &rig).is_ok() {
+        if append_poses(&mut dataset, &source, &robot, &rig).is_ok() {
             let weights: Vec<f64> = dataset.rows.iter().map(|row| row.measurement.weight).collect();
             assert!(weights.iter().all(|&weight| weight > 0.0 && weight.is_finite()), "sigma_mm {sigma}: {weights:?}");
         }

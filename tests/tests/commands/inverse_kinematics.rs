@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use ballbar::{Chain, JointKind, JointVector, Pose};
+use ballbar_calib::kinematics::{InverseKinematics, Thoroughness};
+use ballbar_calib::plan::{Cell, Margins, Pace};
 use ballbar_tests::solids::base_from_tool;
-use host_cal::files::{ROBOTS, Rig, Robot};
-use host_cal::kinematics::{InverseKinematics, Thoroughness};
-use host_cal::plan::{Cell, Margins, Pace};
+use host_cal::files::{ROBOTS, open_rig, open_robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -30,9 +30,9 @@ fn every_branch_reproduces_the_pose_and_the_one_that_made_it_is_among_them() {
     const POSES: usize = 60;
     /// Nearer to a singularity two branches are one.
     const SINGULAR: f64 = 0.01;
-    let rig = Rig::open("triangles").unwrap();
+    let rig = open_rig("triangles").unwrap();
     for (name, _) in ROBOTS {
-        let robot = Robot::open(name).unwrap();
+        let robot = open_robot(name).unwrap();
         let inverse = InverseKinematics::new(&robot);
         let cell = Cell::new(&robot, &rig, 0.075, Margins::default(), Pace::default()).unwrap();
         let (mut rng, mut asked, mut missed) = (ChaCha8Rng::seed_from_u64(5), 0, 0);
@@ -64,7 +64,7 @@ fn every_branch_reproduces_the_pose_and_the_one_that_made_it_is_among_them() {
 #[test]
 fn the_closed_form_has_the_branches_that_a_search_finds() {
     for name in ["puma560", "irb120"] {
-        let robot = Robot::open(name).unwrap();
+        let robot = open_robot(name).unwrap();
         let inverse = InverseKinematics::new(&robot);
         assert!(inverse.is_closed_form(), "{name}");
         let mut rng = ChaCha8Rng::seed_from_u64(9);

@@ -11,7 +11,7 @@ use ballbar::{Counts, LvdtReading, Sample, SettledPose};
 use ballbar_tests::command::{Run, host_cal_command, host_cal_in};
 use ballbar_tests::readers;
 use host_cal::board::{NOMINAL_TRAVEL_M, RobotOnBoard, nominal_lvdt, parameter_set};
-use host_cal::files::Robot;
+use host_cal::files::open_robot;
 use host_cal::session::LogWriter;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -114,7 +114,7 @@ fn sample(index: u32, counts: &[i32], code: u16) -> Sample {
 }
 
 fn set_of(robot: &str) -> ParameterSet {
-    parameter_set(&Robot::open(robot).expect("a built-in robot"), nominal_lvdt(NOMINAL_TRAVEL_M)).expect("its encoders are known")
+    parameter_set(&open_robot(robot).expect("a built-in robot"), nominal_lvdt(NOMINAL_TRAVEL_M)).expect("its encoders are known")
 }
 
 /// Four of a PUMA's joints, the second sliding.

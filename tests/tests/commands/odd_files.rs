@@ -3,11 +3,12 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
+use ballbar_calib::model::{Dataset, Rig, Robot};
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::data::real_data;
 use ballbar_tests::shells::{DESIGN, runs, simulate};
 use ballbar_tests::workbench::{RIG, ROBOT, Workbench};
-use host_cal::files::{Dataset, Rig, Robot, Source, UrdfEnds, parse_urdf, read_plan, read_targets};
+use host_cal::files::{Source, UrdfEnds, append_poses, parse_rig, parse_robot, parse_urdf, read_plan, read_targets};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -259,7 +260,7 @@ fn the_files_that_people_reported_are_read_or_refused_with_advice() {
 
 fn good() -> (Robot, Rig) {
     let source = |text| Source::new("good", text);
-    (Robot::parse(&source(ROBOT)).expect("a good robot"), Rig::parse(&source(RIG)).expect("a good rig"))
+    (parse_robot(&source(ROBOT)).expect("a good robot"), parse_rig(&source(RIG)).expect("a good rig"))
 }
 
 #[test]
@@ -270,7 +271,7 @@ fn a_rig_has_a_hundred_chucks_spheres_and_lengths_at_most() {
     let lengths = |count: usize| (0..count).map(|i| format!("{}", i + 400)).collect::<Vec<_>>().join(", ");
     let rig = |chucks: usize, spheres: usize, bars: usize| {
         let bar = format!("[bar]\nlengths_mm = [{}]\ntravel_mm = 75\n", lengths(bars));
-        Rig::parse(&Source::new("rig.toml", &(points("chucks", chucks) + &points("spheres", spheres) + &bar)))
+        parse_rig(&Source::new("rig.toml", &(points("chucks", chucks) + &points("spheres", spheres) + &bar)))
     };
     assert_eq!(rig(100, 100, 100).expect("at the bound").all_pairings().len(), 10_000);
     for (counts, says) in [((101, 1, 1), "101 chucks"), ((1, 101, 1), "101 spheres"), ((1, 1, 101), "101 bar lengths")] {
@@ -319,7 +320,7 @@ fn the_time_to_refuse_a_header_grows_with_its_length_and_not_with_its_square() {
     let took = |columns: usize| {
         let source = header(columns);
         let began = Instant::now();
-        assert!(Dataset::default().append(&source, &robot, &rig).is_err());
+        assert!(append_poses(&mut Dataset::default(), &source, &robot, &rig).is_err());
         assert!(read_plan(&source, &robot, &rig).is_err() && read_targets(&source, &robot).is_err());
         began.elapsed()
     };
@@ -327,7 +328,7 @@ fn the_time_to_refuse_a_header_grows_with_its_length_and_not_with_its_square() {
     let long = took(300_000);
     assert!(long < Duration::from_secs(30), "300,000 columns take {long:?}");
     let twice = Source::new("wide.csv", &header(200_000).text().replacen("c0", "c199999", 1));
-    let error = Dataset::default().append(&twice, &robot, &rig).expect_err("a column twice").to_string();
+    let error = append_poses(&mut Dataset::default(), &twice, &robot, &rig).expect_err("a column twice").to_string();
     assert_eq!(error, "wide.csv:1: column `c199999` stands there twice");
 }
 
@@ -344,7 +345,7 @@ fn a_long_file_of_keys_is_refused_soon() {
     for text in texts {
         let began = Instant::now();
         let source = Source::new("long.toml", &text);
-        assert!(Robot::parse(&source).is_err() && Rig::parse(&source).is_err());
+        assert!(parse_robot(&source).is_err() && parse_rig(&source).is_err());
         assert!(began.elapsed() < Duration::from_secs(10), "{:.40}… took {:?}", text, began.elapsed());
     }
 }

@@ -4,13 +4,14 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use ballbar::{JointKind, Kinematics};
+use ballbar_calib::identify::{FitOptions, fit};
+use ballbar_calib::model::{Rig, Robot};
+use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace, PlanOptions, PlanRow, RowKind, Swing, UnsafePlan};
 use ballbar_tests::data::real_data;
 use ballbar_tests::plans::{fitted, least_by_naive_cell, options, planned, plausible_robot};
 use ballbar_tests::solids::NaiveCell;
 use ballbar_tests::workbench::{self, Workbench};
-use host_cal::files::{Dataset, PlanRow, ROBOTS, Rig, Robot, RowKind, UrdfEnds, read_urdf};
-use host_cal::identify::{FitOptions, fit};
-use host_cal::plan::{Cell, CheckedPlan, Margins, Pace, PlanOptions, Swing, UnsafePlan};
+use host_cal::files::{ROBOTS, UrdfEnds, open_rig, open_robot, read_poses, read_urdf};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -18,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 fn keeps_margins(name: &str, pairings: &[(&str, &str)], bars_m: &[f64], poses_per_shell: usize) {
     const STEP: f64 = 0.02;
     const ROBOTS: usize = 1000;
-    let (robot, rig) = (Robot::open(name).unwrap(), Rig::open("triangles").unwrap());
+    let (robot, rig) = (open_robot(name).unwrap(), open_rig("triangles").unwrap());
     let options = options(&rig, pairings, bars_m, poses_per_shell);
     let margins = options.margins;
     let plan = planned(&robot, &rig, &options);
@@ -91,7 +92,7 @@ fn a_plan_of_four_joints_keeps_its_margins() {
 
 #[test]
 fn a_plan_without_its_via_points_keeps_no_margins() {
-    let (robot, rig) = (Robot::open("puma560").unwrap(), Rig::open("triangles").unwrap());
+    let (robot, rig) = (open_robot("puma560").unwrap(), open_rig("triangles").unwrap());
     let mut rows = planned(&robot, &rig, &options(&rig, &[("A", "1")], &[0.46], 9)).rows;
     rows.retain(|row| row.kind == RowKind::Measure);
     let ((gap_m, _), travel_m) = least_by_naive_cell(&robot, &rig, &rows, 0.02);
@@ -102,9 +103,9 @@ fn a_plan_without_its_via_points_keeps_no_margins() {
 
 #[test]
 fn a_fitted_robot_is_planned_with_as_many_poses_as_its_design() {
-    let rig = Rig::open("triangles").unwrap();
+    let rig = open_rig("triangles").unwrap();
     for (name, _) in ROBOTS {
-        let design = Robot::open(name).unwrap();
+        let design = open_robot(name).unwrap();
         let options = options(&rig, &[("B", "2"), ("A", "1")], &[0.46], 18);
         let before = planned(&design, &rig, &options).shells.iter().map(|shell| shell.measured).sum::<usize>();
         let plan = planned(&fitted(&design, &rig, 5), &rig, &options);
@@ -124,7 +125,7 @@ fn measured_clear_of_all(robot: &Robot, rig: &Rig, options: &PlanOptions) -> usi
 
 #[test]
 fn imported_robots_and_what_is_fitted_to_them_are_planned() {
-    let near = Rig::open("triangles").unwrap();
+    let near = open_rig("triangles").unwrap();
     let far = {
         let mut rig = near.clone();
         rig.chucks.iter_mut().for_each(|chuck| chuck.position_m.x += 0.6);
@@ -143,12 +144,12 @@ fn imported_robots_and_what_is_fitted_to_them_are_planned() {
 #[test]
 fn robots_fitted_to_real_lengths_are_planned() {
     let Some(mukca) = real_data("mukca") else { return };
-    let rig = Rig::open("triangles").unwrap();
+    let rig = open_rig("triangles").unwrap();
     for (name, place) in [("panda_2", "front_left"), ("panda_6", "front"), ("kuka_14", "front")] {
         let file = |name: String| mukca.join(name).display().to_string();
-        let design = Robot::open(&file(format!("{name}/robot.toml"))).unwrap();
-        let of_poses = Rig::open(&file(format!("{name}/rig_{place}.toml"))).unwrap();
-        let poses = Dataset::read([Path::new(&file(format!("{name}/poses_{place}.csv")))], &design, &of_poses).unwrap();
+        let design = open_robot(&file(format!("{name}/robot.toml"))).unwrap();
+        let of_poses = open_rig(&file(format!("{name}/rig_{place}.toml"))).unwrap();
+        let poses = read_poses([Path::new(&file(format!("{name}/poses_{place}.csv")))], &design, &of_poses).unwrap();
         let mut robot = design.clone();
         robot.chain = fit(&design, &poses, &FitOptions::default()).unwrap().solution.chain;
         let options = options(&rig, &[("A", "1"), ("B", "2")], &[0.46], 12);
@@ -160,7 +161,7 @@ fn robots_fitted_to_real_lengths_are_planned() {
 
 #[test]
 fn an_offset_of_a_quarter_of_a_millimetre_makes_no_link() {
-    let (design, rig) = (Robot::open("puma560").unwrap(), Rig::open("triangles").unwrap());
+    let (design, rig) = (open_robot("puma560").unwrap(), open_rig("triangles").unwrap());
     let options = options(&rig, &[("A", "1")], &[0.46], 6);
     let poses = |robot: &Robot| planned(robot, &rig, &options).shells[0].measured;
     let before = poses(&design);
@@ -177,14 +178,14 @@ fn an_offset_of_a_quarter_of_a_millimetre_makes_no_link() {
 
 #[test]
 fn a_gap_that_motion_cannot_change_blocks_no_path() {
-    let robot = Robot::open("puma560").unwrap();
+    let robot = open_robot("puma560").unwrap();
     let bench = Workbench::new();
     // A PUMA's third link passes its first 149.09 mm off, in every posture; a bar's end is 35 mm before its own plate.
     let cases = [("links", "link_radius_mm = 69.0"), ("plate", "sphere_plate_behind_mm = 26.0"), ("bar", "bar_radius_mm = 24.0")];
     for (name, size) in cases {
         let file = format!("{name}.toml");
         bench.put(&file, format!("{}\n[solids]\n{size}\n", workbench::RIG));
-        let rig = Rig::open(bench.path(&file).to_str().unwrap()).unwrap();
+        let rig = open_rig(bench.path(&file).to_str().unwrap()).unwrap();
         let plan = planned(&robot, &rig, &options(&rig, &[("A", "1")], &[0.46], 9));
         assert_eq!(plan.shells[0].measured, 9, "{name}: {:?}", plan.shells[0].hindrances);
         let gaps: Vec<f64> = plan.rows.iter().filter_map(|row| Some(row.margins.as_ref()?.clearance_m)).collect();
@@ -198,9 +199,9 @@ fn the_check_sees_the_gaps_that_an_independent_library_sees() {
     const POSTURES: usize = 160_000;
     /// The library's distances of a plate, to it a cylinder without thickness, are true to some 10 µm.
     const SAME_M: f64 = 2e-5;
-    let rig = Rig::open("triangles").unwrap();
-    let designs = ROBOTS.map(|(name, _)| Robot::open(name).unwrap());
-    let fitted = ["puma560", "ur5e"].map(|name| fitted(&Robot::open(name).unwrap(), &rig, 6));
+    let rig = open_rig("triangles").unwrap();
+    let designs = ROBOTS.map(|(name, _)| open_robot(name).unwrap());
+    let fitted = ["puma560", "ur5e"].map(|name| fitted(&open_robot(name).unwrap(), &rig, 6));
     let robots: Vec<Robot> = designs.into_iter().chain(fitted).collect();
     let mut seen = HashMap::<String, usize>::new();
     for robot in &robots {
@@ -224,9 +225,9 @@ fn the_check_sees_the_gaps_that_an_independent_library_sees() {
 #[test]
 fn what_stays_clear_for_certain_is_clear_wherever_the_joints_go() {
     const PLACES: usize = 40;
-    let rig = Rig::open("triangles").unwrap();
+    let rig = open_rig("triangles").unwrap();
     for name in ["puma560", "stanford", "scara"] {
-        let robot = Robot::open(name).unwrap();
+        let robot = open_robot(name).unwrap();
         let cell = Cell::new(&robot, &rig, 0.075, Margins::default(), Pace::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(12);
         let (mut certain, mut asked) = (0, 0);
@@ -257,7 +258,7 @@ fn what_stays_clear_for_certain_is_clear_wherever_the_joints_go() {
 
 #[test]
 fn nothing_moves_along_a_plan_that_leads_into_something() {
-    let (robot, rig) = (Robot::open("puma560").unwrap(), Rig::open("triangles").unwrap());
+    let (robot, rig) = (open_robot("puma560").unwrap(), open_rig("triangles").unwrap());
     let options = options(&rig, &[("A", "1")], &[0.46], 6);
     let cell = Cell::new(&robot, &rig, options.travel_m, options.margins, options.pace).unwrap();
     let rows = planned(&robot, &rig, &options).rows;

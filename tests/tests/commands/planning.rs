@@ -3,10 +3,10 @@
 use std::fs;
 use std::sync::Mutex;
 
+use ballbar_calib::plan::{Cell, PlanOptions, Progress, Stage, check, plan};
 use ballbar_tests::plans::{options, planned};
 use ballbar_tests::workbench::{self, Workbench};
-use host_cal::files::{Rig, Robot};
-use host_cal::plan::{Cell, PlanError, PlanOptions, Progress, Stage, check, plan};
+use host_cal::files::{open_rig, open_robot};
 
 const PLAN: [&str; 7] = ["plan", "--robot", "puma560", "--rig", "triangles", "--bar", "460"];
 /// Tells all parameters.
@@ -138,7 +138,7 @@ fn a_plan_that_is_not_of_this_robot_or_is_damaged_is_refused() {
 #[test]
 fn a_refusal_points_to_its_cause() {
     let bench = Workbench::new();
-    let help = |solids: &str, chucks: [&str; 2], change: &dyn Fn(&mut PlanOptions), spheres: [&str; 2]| {
+    let said = |solids: &str, chucks: [&str; 2], more: &[&str], spheres: [&str; 2]| {
         let text = workbench::RIG
             .replace("[565.0, 0.0, 0.0]", chucks[0])
             .replace("[392.0, 100.0, 0.0]", chucks[1])
@@ -151,30 +151,21 @@ fn a_refusal_points_to_its_cause() {
                 spheres[1].replace("50.0,", "-50.0,")
             ),
         );
-        let rig = Rig::open(bench.path("cause.toml").to_str().unwrap()).unwrap();
-        let mut options = options(&rig, &[("A", "1")], &[0.46], 6);
-        change(&mut options);
-        match plan(&Robot::open("puma560").unwrap(), &rig, &options, &|_| ()) {
-            Ok(plan) => format!("{:?}", plan.shells),
-            Err(PlanError::OutOfReach { remedy, .. }) => remedy,
-            Err(_) => {
-                let args = ["plan", "--robot", "puma560", "--rig", "cause.toml", "--pairings", "A:1", "--bar", "460"];
-                bench.fails(2, &args).replace('│', "").split_whitespace().collect::<Vec<_>>().join(" ")
-            }
-        }
+        let args = ["plan", "--robot", "puma560", "--rig", "cause.toml", "--pairings", "A:1", "--per-pair", "6"];
+        bench.fails(2, &[&args[..], more].concat()).replace('│', "").split_whitespace().collect::<Vec<_>>().join(" ")
     };
     const FRONT: [&str; 2] = ["[565.0, 0.0, 0.0]", "[392.0, 100.0, 0.0]"];
     const HIGH: [&str; 2] = ["[500.0, 0.0, 800.0]", "[327.0, 100.0, 800.0]"];
     const AHEAD: [&str; 2] = ["[57.0, 0.0, 80.0]", "[-28.0, 50.0, 80.0]"];
     /// Turned by 90° about the tool's y.
     const ACROSS: [&str; 2] = ["[80.0, 0.0, -57.0]", "[80.0, 50.0, 28.0]"];
-    let table = help("link_radius_mm = 90.0", HIGH, &|options| options.bars_m = vec![0.3], AHEAD);
+    let table = said("link_radius_mm = 90.0", HIGH, &["--bar", "300"], AHEAD);
     assert!(table.contains("table_below_chucks_mm"), "{table}");
-    let travel = help("", FRONT, &|options| options.margins.travel_m = 0.034, AHEAD);
+    let travel = said("", FRONT, &["--bar", "460", "--travel-margin-mm", "34"], AHEAD);
     assert!(travel.contains("--travel-margin-mm"), "{travel}");
-    let far = help("", FRONT, &|options| options.bars_m = vec![2.5], AHEAD);
-    assert!(far.contains("--bar"), "{far}");
-    let across = help("", FRONT, &|_| (), ACROSS);
+    let far = said("", FRONT, &["--bar", "2500"], AHEAD);
+    assert!(far.contains("another bar length with --bar"), "{far}");
+    let across = said("", FRONT, &["--bar", "460"], ACROSS);
     assert!(across.contains("turn the spheres' positions"), "{across}");
 }
 
@@ -183,14 +174,14 @@ fn links_too_thick_for_their_joint_are_not_looked_at_beside_one_another() {
     // A PUMA's third link passes its first 149 mm off, in every posture.
     let bench = Workbench::new();
     bench.put("thick.toml", format!("{}\n[solids]\nlink_radius_mm = 70.0\n", workbench::RIG));
-    let (robot, rig) = (Robot::open("puma560").unwrap(), Rig::open(bench.path("thick.toml").to_str().unwrap()).unwrap());
+    let (robot, rig) = (open_robot("puma560").unwrap(), open_rig(bench.path("thick.toml").to_str().unwrap()).unwrap());
     let plan = planned(&robot, &rig, &options(&rig, &[("A", "1")], &[0.46], 6));
     assert_eq!(plan.shells[0].measured, 6, "{:?}", plan.shells[0].hindrances);
 }
 
 #[test]
 fn the_same_seed_gives_the_same_plan_and_another_gives_another() {
-    let (robot, rig) = (Robot::open("stanford").unwrap(), Rig::open("triangles").unwrap());
+    let (robot, rig) = (open_robot("stanford").unwrap(), open_rig("triangles").unwrap());
     let mut options = options(&rig, &[("A", "1"), ("B", "2")], &[0.46], 6);
     let rows = |options: &PlanOptions| planned(&robot, &rig, options).rows;
     let first = rows(&options);
@@ -201,7 +192,7 @@ fn the_same_seed_gives_the_same_plan_and_another_gives_another() {
 
 #[test]
 fn progress_names_its_stage_and_grows_to_the_end_of_each() {
-    let (robot, rig) = (Robot::open("puma560").unwrap(), Rig::open("triangles").unwrap());
+    let (robot, rig) = (open_robot("puma560").unwrap(), open_rig("triangles").unwrap());
     let pairings = [("A", "1"), ("B", "2"), ("C", "3")];
     for optimal in [None, Some(38)] {
         let told = Mutex::new(Vec::<Progress>::new());

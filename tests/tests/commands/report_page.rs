@@ -3,14 +3,15 @@
 use std::fs;
 
 use ballbar::{FreeParameters, Kinematics};
+use ballbar_calib::assess::{Answer, Assessment, Evidence};
+use ballbar_calib::identify::{Fit, FitOptions, LmOptions, fit, solve};
+use ballbar_calib::model::Dataset;
+use ballbar_calib::simulate::tool_error;
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::experiment::Puma;
 use ballbar_tests::shells::{DESIGN, puma, runs};
-use host_cal::assess::{Answer, Assessment, Evidence};
-use host_cal::files::{Dataset, RIGS, ROBOTS};
-use host_cal::identify::{Fit, FitOptions, LmOptions, fit, solve};
+use host_cal::files::{RIGS, ROBOTS, open_robot};
 use host_cal::report::{Facts, Inputs, figures, html};
-use host_cal::simulate::tool_error;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -319,7 +320,7 @@ fn an_outlier_drift_and_few_parameters_are_reasons_for_reserve() {
 #[test]
 fn a_robot_that_is_as_designed_has_nothing_to_correct() {
     let puma = Puma::default();
-    let same = Puma { truth: host_cal::files::Robot::open("puma560").expect("built in"), ..Puma::default() };
+    let same = Puma { truth: open_robot("puma560").expect("built in"), ..Puma::default() };
     let dataset = same.shells(0.46, 30, 0.0, 3);
     let fit = fit(&puma.design, &dataset, &FitOptions::default()).expect("enough poses");
     let facts = facts(&puma, &dataset, &fit);

@@ -8,7 +8,7 @@ use ballbar_firmware::ENCODERS;
 use ballbar_tests::emulator::{EmulatedBoard, is_skipped};
 use ballbar_tests::scenarios::{self, Bench, host_cal, host_cal_run};
 use ballbar_tests::simulated_cell::{self, DESIGN, SHORT_PLAN, SimulatedCell};
-use host_cal::files::Dataset;
+use host_cal::files::read_poses;
 use host_cal::virtual_board::{Driven, Plant, Script, driver};
 use serde_json::Value;
 
@@ -198,7 +198,7 @@ fn a_plan_is_collected() {
 
     let (truth, rig) = (simulated_cell::truth(), simulated_cell::rig());
     let kinematics = Kinematics::new(&truth.chain);
-    let poses = Dataset::read([cell.path("session/poses.csv").as_path()], &truth, &rig).unwrap();
+    let poses = read_poses([cell.path("session/poses.csv").as_path()], &truth, &rig).unwrap();
     let off_m = |m: ballbar::Measurement<f64>| (m.length_m - kinematics.length(&m.q, &m.pairing)).abs();
     let largest_m = poses.measurements().into_iter().map(off_m).fold(0.0, f64::max);
     println!("largest error of a length: {:.2} µm", largest_m * 1e6);

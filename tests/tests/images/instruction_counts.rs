@@ -3,7 +3,7 @@
 
 use ballbar::{MAX_PARAMETERS, PARAMETERS_PER_JOINT, ParameterKind};
 use ballbar_tests::emulator::{Image, is_skipped, output_of};
-use host_cal::files::{Rig, Robot};
+use host_cal::files::{open_rig, open_robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -38,7 +38,7 @@ fn hot_paths_stay_within_their_limits() {
 
 /// A PUMA 560 at random poses within its limits, with all pairings in turn: the memory that the program reads.
 fn inputs() -> Vec<u8> {
-    let (robot, rig) = (Robot::open("puma560").unwrap(), Rig::open("triangles").unwrap());
+    let (robot, rig) = (open_robot("puma560").unwrap(), open_rig("triangles").unwrap());
     let mut bytes = Vec::new();
     bytes.extend(f32_bytes(robot.chain.parameters()));
     bytes.extend(free_parameters(robot.chain.parameters().len()).iter().flat_map(|index| index.to_le_bytes()));

@@ -1,13 +1,14 @@
 //! Whether a fit is believed: measurements with a mistake in them are refused and the mistake is named, good ones are not accused.
 
 use ballbar::JointKind;
+use ballbar_calib::assess::{Answer, Assessment, Evidence, Refusal, RmsGround};
+use ballbar_calib::identify::{FitOptions, Hold, fit};
+use ballbar_calib::model::{Dataset, PairingId, PoseRow, Rig, Robot};
+use ballbar_calib::simulate::Shells;
 use ballbar_tests::command::{Run, host_cal_in};
 use ballbar_tests::data::real_data;
 use ballbar_tests::experiment::{Puma, dataset};
-use host_cal::assess::{Answer, Assessment, Evidence, Refusal, RmsGround};
-use host_cal::files::{Dataset, PairingId, PoseRow, Rig, Robot};
-use host_cal::identify::{FitOptions, Hold, fit};
-use host_cal::simulate::Shells;
+use host_cal::files::{calibration, open_rig, open_robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -22,7 +23,7 @@ struct Cell {
 
 impl Cell {
     fn new(robot: &str, seed: u64) -> Self {
-        let design = Robot::open(robot).expect("built in");
+        let design = open_robot(robot).expect("built in");
         let mut truth = design.clone();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         for (i, value) in truth.chain.parameters_mut().iter_mut().enumerate() {
@@ -34,7 +35,7 @@ impl Cell {
             };
             *value += rng.random_range(-most..most);
         }
-        Self { design, truth, rig: Rig::open("triangles").expect("built in") }
+        Self { design, truth, rig: open_rig("triangles").expect("built in") }
     }
 
     fn measured(&self, bar_m: f64, seed: u64) -> Dataset {
@@ -243,7 +244,7 @@ fn a_robot_that_is_right_already_is_kept_as_it_is() {
         let evidence = Evidence { robot, rig, dataset: &poses, fit: &fitted, unseen: &[], max_rms_m: None };
         let told = Assessment::new(&evidence);
         assert_eq!(told.answer, Answer::Unchanged, "{:?}", told.reasons);
-        let (chain, calibration) = told.calibration(&evidence).expect("nothing against it");
+        let (chain, calibration) = calibration(&evidence, &told).expect("nothing against it");
         assert_eq!(chain, &robot.chain, "what a fit to noise would change is not written");
         assert_eq!(calibration.rms_mm, calibration.rms_initial_mm);
         assert!(calibration.reasons[0].contains("as well as a fit"), "{calibration:?}");

@@ -4,8 +4,8 @@
 use ballbar::{
     Chain, Damping, FreeParameters, JointKind, Kinematics, MAX_PARAMETERS, Matrix3, Measurement, Pairing, Real, Vector3,
 };
+use ballbar_calib::identify::{LmOptions, Observation, Solution, Spectrum, Uncertainty, solve};
 use ballbar_tests::data::golden;
-use host_cal::identify::{LmOptions, Observation, Solution, Spectrum, Uncertainty, solve};
 use serde::Deserialize;
 
 #[derive(Deserialize)]

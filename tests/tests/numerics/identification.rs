@@ -1,17 +1,19 @@
 //! Fits of simulated lengths: accuracy, honesty of the deviations, reasons for ending, outliers.
 
 use ballbar::{Chain, Damping, FreeParameters, JointKind, Kinematics, Parameter};
-use ballbar_tests::experiment::{Puma, worst_parameter_difference};
-use host_cal::files::Dataset;
-use host_cal::identify::{
-    Finding, Fit, FitError, FitOptions, Hold, LmOptions, OutlierTest, ResidualSummary, Status, Uncertainty, fit, residuals, solve,
+use ballbar_calib::identify::{
+    Finding, Fit, FitError, FitOptions, Hold, HoldRule, LmOptions, OutlierTest, ResidualSummary, Status, Uncertainty, fit,
+    residuals, solve,
 };
-use host_cal::simulate::tool_error;
+use ballbar_calib::model::Dataset;
+use ballbar_calib::simulate::tool_error;
+use ballbar_tests::experiment::{Puma, worst_parameter_difference};
 
 const SIGMA_M: f64 = 0.084e-3;
 
-fn hold(text: &str) -> FitOptions {
-    FitOptions { hold: text.parse().unwrap(), ..FitOptions::default() }
+fn hold(rule: HoldRule, names: &[&str]) -> FitOptions {
+    let names = names.iter().map(|name| name.parse().unwrap()).collect();
+    FitOptions { hold: Hold { rule, names }, ..FitOptions::default() }
 }
 
 fn fit_puma(puma: &Puma, dataset: &Dataset, options: &FitOptions) -> Fit {
@@ -65,7 +67,7 @@ fn auto_frees_what_the_paper_frees() {
 fn all_54_and_the_36_reach_the_same_cost_and_the_same_kinematics() {
     let puma = Puma::default();
     let poses = puma.shells(0.46, 40, SIGMA_M, 11);
-    let few = fit_puma(&puma, &poses, &hold("paper"));
+    let few = fit_puma(&puma, &poses, &hold(HoldRule::Paper, &[]));
     for damping in [Damping::Identity, Damping::Diagonal] {
         let all = fit_puma(&puma, &poses, &FitOptions { hold: Hold::none(), damping });
         assert!((all.fitted.rms_m - few.fitted.rms_m).abs() < 1e-13, "{damping:?}");
@@ -83,7 +85,7 @@ fn deviations_are_as_large_as_the_errors_that_they_stand_for() {
     let puma = Puma::default();
     let (mut squares, mut count) = (0.0, 0);
     for seed in 0..24 {
-        let result = fit_puma(&puma, &puma.shells(0.46, 10, SIGMA_M, seed), &hold("paper"));
+        let result = fit_puma(&puma, &puma.shells(0.46, 10, SIGMA_M, seed), &hold(HoldRule::Paper, &[]));
         for parameter in result.parameters.iter().filter(|parameter| parameter.held.is_none()) {
             let truth = puma.truth.chain.parameters()[parameter.parameter.index()];
             squares += ((parameter.fitted - truth) / parameter.std.unwrap()).powi(2);
@@ -109,8 +111,8 @@ fn a_start_at_the_minimum_is_not_called_converged() {
     let puma = Puma::default();
     let poses = puma.shells(0.46, 20, SIGMA_M, 4);
     let mut robot = puma.design.clone();
-    robot.chain = fit_puma(&puma, &poses, &hold("paper")).solution.chain;
-    let again = fit(&robot, &poses, &hold("paper")).unwrap();
+    robot.chain = fit_puma(&puma, &poses, &hold(HoldRule::Paper, &[])).solution.chain;
+    let again = fit(&robot, &poses, &hold(HoldRule::Paper, &[])).unwrap();
     assert_eq!(again.solution.status, Status::AlreadyOptimal);
     assert_eq!(again.solution.chain, robot.chain);
 }
@@ -119,7 +121,11 @@ fn a_start_at_the_minimum_is_not_called_converged() {
 fn a_fit_without_a_free_parameter_says_that_nothing_is_observable() {
     let puma = Puma::default();
     let every_name: Vec<String> = (0..54).map(|index| Parameter::from_index(index).to_string()).collect();
-    let result = fit_puma(&puma, &puma.shells(0.46, 10, SIGMA_M, 4), &hold(&every_name.join(",")));
+    let result = fit_puma(
+        &puma,
+        &puma.shells(0.46, 10, SIGMA_M, 4),
+        &hold(HoldRule::None, &every_name.iter().map(String::as_str).collect::<Vec<_>>()),
+    );
     assert_eq!(result.solution.status, Status::NothingObservable);
     assert_eq!(result.solution.chain, puma.design.chain);
     assert!(!result.solution.status.is_minimum());
@@ -166,10 +172,10 @@ fn lengths_that_are_no_numbers_end_the_solve_at_once() {
 fn as_many_poses_as_free_parameters_are_refused() {
     let puma = Puma::default();
     let mut poses = puma.shells(0.46, 4, SIGMA_M, 4);
-    let refused = fit(&puma.design, &poses, &hold("paper")).unwrap_err();
+    let refused = fit(&puma.design, &poses, &hold(HoldRule::Paper, &[])).unwrap_err();
     assert_eq!(refused, FitError::NoRedundancy { rows: 36, free: 36 });
     poses.rows.extend(puma.shells(0.46, 1, SIGMA_M, 5).rows);
-    assert!(fit(&puma.design, &poses, &hold("paper")).is_ok());
+    assert!(fit(&puma.design, &poses, &hold(HoldRule::Paper, &[])).is_ok());
 }
 
 #[test]
@@ -228,12 +234,12 @@ fn a_subset_is_chosen_around_parameters_held_by_name() {
     let puma = Puma::default();
     let poses = puma.shells(0.46, 20, SIGMA_M, 7);
     let auto = fit_puma(&puma, &poses, &FitOptions::default());
-    for names in ["alpha1", "alpha1,z1"] {
-        let around = fit_puma(&puma, &poses, &hold(&format!("auto,{names}")));
-        assert_eq!(around.free_parameters(), 36, "{names}");
-        assert!((around.fitted.rms_m - auto.fitted.rms_m).abs() < 1e-11, "{names}: {:e}", around.fitted.rms_m);
+    for names in [&["alpha1"][..], &["alpha1", "z1"]] {
+        let around = fit_puma(&puma, &poses, &hold(HoldRule::Auto, names));
+        assert_eq!(around.free_parameters(), 36, "{names:?}");
+        assert!((around.fitted.rms_m - auto.fitted.rms_m).abs() < 1e-11, "{names:?}: {:e}", around.fitted.rms_m);
     }
-    let scale = fit_puma(&puma, &poses, &hold("auto,scale3"));
+    let scale = fit_puma(&puma, &poses, &hold(HoldRule::Auto, &["scale3"]));
     assert_eq!(scale.free_parameters(), 35, "nothing stands in for a scale");
     assert!(scale.identifiability.not_identified().all(|(parameter, _)| parameter.to_string() != "scale3"));
 }

@@ -1,6 +1,7 @@
 //! Numbers: golden values, derivatives, ranks, precision, real data.
 
 mod assessments;
+mod built_in_robots;
 mod golden;
 mod gradients;
 mod identification;

@@ -5,9 +5,10 @@ use ballbar::{
     Chain, DampedSolver, Damping, FreeParameters, JointVector, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Pairing,
     Parameter, ParameterKind, Real, Vector3,
 };
-use host_cal::files::{Rig, Robot};
-use host_cal::identify::{LmOptions, solve};
-use host_cal::simulate::Shells;
+use ballbar_calib::identify::{LmOptions, solve};
+use ballbar_calib::model::Robot;
+use ballbar_calib::simulate::Shells;
+use host_cal::files::{open_rig, open_robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -26,7 +27,7 @@ struct Both {
 
 /// Random poses of a robot within its limits: the same joint vector in both precisions.
 fn for_random_poses(name: &str, poses: usize, mut check: impl FnMut(&Both, JointVector<f64>, JointVector<f32>)) {
-    let Robot { chain, limits, .. } = Robot::open(name).unwrap();
+    let Robot { chain, limits, .. } = open_robot(name).unwrap();
     let both = Both { f64: Kinematics::new(&chain), f32: Kinematics::new(&chain.cast::<f32>()), chain };
     let mut rng = ChaCha8Rng::seed_from_u64(560);
     for _ in 0..poses {
@@ -65,7 +66,7 @@ fn the_tool_pose_in_f32_is_within_a_micrometre() {
 /// Measured: 0.26 µm with the design parameters, 0.45 µm with the optimised ones.
 #[test]
 fn a_sphere_in_f32_is_within_a_micrometre() {
-    let rig = Rig::open("triangles").unwrap();
+    let rig = open_rig("triangles").unwrap();
     for name in ROBOTS {
         let mut worst_m = 0.0;
         for_random_poses(name, 100_000, |both, q64, q32| {
@@ -87,7 +88,7 @@ fn a_sphere_in_f32_is_within_a_micrometre() {
 #[test]
 fn lengths_and_gradient_rows_in_f32_are_close_to_those_in_f64() {
     const SHORTEST_M: f64 = 0.3;
-    let rig = Rig::open("triangles").unwrap();
+    let rig = open_rig("triangles").unwrap();
     for name in ROBOTS {
         let (mut worst_m, mut worst, mut worst_of_scales) = (0.0, 0.0, 0.0);
         for_random_poses(name, 50_000, |both, q64, q32| {
@@ -155,8 +156,8 @@ fn fit_with_f32_equations<K: Real>(design: &Chain<f64>, measurements: &[Measurem
 /// rounding of the lengths. The RMS residual, flat at its minimum, differs by 2e-14 mm and 3e-8 mm.
 #[test]
 fn a_fit_with_f32_equations_ends_at_the_optimum() {
-    let [design, truth] = ROBOTS.map(|name| Robot::open(name).unwrap());
-    let rig = Rig::open("triangles").unwrap();
+    let [design, truth] = ROBOTS.map(|name| open_robot(name).unwrap());
+    let rig = open_rig("triangles").unwrap();
     let shells = Shells {
         planned_with: &design,
         truth: &truth,

@@ -1,9 +1,9 @@
 //! Rank: what random chains and all choices of pairings can identify.
 
 use ballbar::{Chain, JointKind, Measurement, Pairing, Vector3};
+use ballbar_calib::identify::{Finding, Identifiability, Observation, Spectrum, bound_by_ends, bound_by_pairings, remarks};
+use ballbar_calib::model::JointLimits;
 use ballbar_tests::experiment::Puma;
-use host_cal::files::JointLimits;
-use host_cal::identify::{Finding, Identifiability, Observation, Spectrum, bound_by_ends, bound_by_pairings, remarks};
 use host_cal::paper::PairingRanks;
 use proptest::prelude::*;
 

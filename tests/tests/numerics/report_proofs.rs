@@ -1,13 +1,13 @@
 //! What the report takes for a proof: lengths of one posture prove nothing of one another, and the worst proof decides.
 
 use ballbar::Kinematics;
+use ballbar_calib::assess::{Assessment, Evidence, ProofKind};
+use ballbar_calib::identify::{Fit, FitOptions, fit};
+use ballbar_calib::model::{Dataset, PairingId, PoseRow};
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::data::real_data;
 use ballbar_tests::experiment::{Puma, dataset};
 use ballbar_tests::shells::{DESIGN, puma, runs};
-use host_cal::assess::{Assessment, Evidence, ProofKind};
-use host_cal::files::{Dataset, PairingId, PoseRow};
-use host_cal::identify::{Fit, FitOptions, fit};
 use host_cal::report::{Facts, Inputs};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,9 @@
 //! The built-in robots: where they stand beside independent numbers, and what can be identified of each.
 
 use ballbar::{JointKind, JointVector, Kinematics, Matrix3, Measurement, Pairing, Vector3};
-use host_cal::files::{ROBOTS, Robot};
-use host_cal::identify::Identifiability;
+use ballbar_calib::identify::Identifiability;
+use ballbar_calib::model::Robot;
+use host_cal::files::{ROBOTS, open_robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -80,7 +81,7 @@ fn every_robot_stands_where_its_sources_say() {
         assert!(GOLDEN.iter().any(|golden| golden.robot == name), "no numbers for {name}");
     }
     for Golden { robot: name, q, position_mm, rotation } in GOLDEN {
-        let robot = Robot::open(name).unwrap();
+        let robot = open_robot(name).unwrap();
         let pose = Kinematics::new(&robot.chain).base_from_tool(&joint_vector(&robot, q));
         let off_mm = (pose.translation_m * 1e3 - Vector3::from(position_mm)).amax();
         assert!(off_mm <= 1e-6, "{name} at {q:?}: {} mm, off by {off_mm:e}", pose.translation_m.transpose() * 1e3);
@@ -92,7 +93,7 @@ fn every_robot_stands_where_its_sources_say() {
 }
 
 /// Product manual IRB 120, 3HAC035728-001 revision W, section 2.2.2: angles of axes 2 and 3 in degrees, x and z in millimetres.
-/// Its positions D and H are misprints (see `host/robots/irb120.toml`).
+/// Its positions D and H are misprints (see `host/app/robots/irb120.toml`).
 const ABB_WRIST_CENTRES: [(char, [f64; 2], [f64; 2]); 7] = [
     ('A', [0.0, 0.0], [302.0, 630.0]),
     ('B', [0.0, -77.0], [0.0, 870.0]),
@@ -105,7 +106,7 @@ const ABB_WRIST_CENTRES: [(char, [f64; 2], [f64; 2]); 7] = [
 
 #[test]
 fn the_irb120s_wrist_centre_is_where_abb_prints_it() {
-    let robot = Robot::open("irb120").unwrap();
+    let robot = open_robot("irb120").unwrap();
     let kinematics = Kinematics::new(&robot.chain);
     // The wrist centre lies 72 mm behind the flange.
     let wrist_tool_m = Vector3::new(0.0, 0.0, -0.072);
@@ -120,7 +121,7 @@ fn the_irb120s_wrist_centre_is_where_abb_prints_it() {
 #[test]
 fn limits_are_one_a_joint_and_include_their_ends_and_middle() {
     for (name, _) in ROBOTS {
-        let robot = Robot::open(name).unwrap();
+        let robot = open_robot(name).unwrap();
         assert_eq!(robot.limits.len(), robot.chain.joints(), "{name}");
         assert_eq!(robot.encoders.len(), robot.chain.joints(), "{name}");
         for limits in &robot.limits {
@@ -157,7 +158,7 @@ fn random_measurements(robot: &Robot, seed: u64) -> Vec<Measurement<f64>> {
 #[test]
 fn nine_pairings_identify_all_that_is_independent_and_nothing_but_redundancy_is_left() {
     for (name, _) in ROBOTS {
-        let robot = Robot::open(name).unwrap();
+        let robot = open_robot(name).unwrap();
         for seed in 0..3 {
             let found = Identifiability::new(&robot.chain, &random_measurements(&robot, seed), &robot.limits, &[]);
             let independent = robot.chain.independent_parameters();

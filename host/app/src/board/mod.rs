@@ -1,5 +1,6 @@
 //! The host's end of the wire: the serial port, requests and their replies, what is believed of a stream and what it lost.
 
+mod encoders;
 mod errors;
 mod filter;
 mod link;
@@ -10,6 +11,7 @@ mod robot_on_board;
 mod tally;
 mod verify;
 
+pub use encoders::{NoEncoders, joint_encoders};
 pub use errors::{BoardError, PortError};
 pub use filter::MessageFilter;
 pub use link::{BoardLink, Frame};

@@ -2,12 +2,13 @@
 
 use ballbar::wire::{Answer, Command, ParameterSet, Refusal, Status, WhichSet};
 use ballbar::{Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose};
+use ballbar_calib::model::Robot;
 use miette::Diagnostic;
 use thiserror::Error;
 
+use super::encoders::{NoEncoders, joint_encoders};
 use super::errors::BoardError;
 use super::link::BoardLink;
-use crate::files::{NoEncoders, Robot};
 
 /// Why a robot's file cannot be put on a board.
 #[derive(Debug, Error, Diagnostic)]
@@ -32,7 +33,7 @@ pub enum SetError {
 /// # Errors
 /// [`SetError`] when the file lacks encoders, or the board could not use it.
 pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, SetError> {
-    robot.joint_encoders()?;
+    joint_encoders(robot)?;
     let encoders = robot.encoders.iter().filter_map(|facts| facts.encoder);
     let couplings = robot.encoders.iter().flat_map(|facts| &facts.couplings);
     let set = ParameterSet {
@@ -49,7 +50,7 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
             .collect(),
         lvdt,
     };
-    let unfit = |reason: String| SetError::Unfit { robot: robot.source_name().to_owned(), reason };
+    let unfit = |reason: String| SetError::Unfit { robot: robot.source.as_str().to_owned(), reason };
     if robot.encoders.iter().map(|facts| facts.couplings.len()).sum::<usize>() > ballbar::MAX_COUPLINGS {
         return Err(unfit(format!("more than {} couplings", ballbar::MAX_COUPLINGS)));
     }

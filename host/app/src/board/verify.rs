@@ -2,12 +2,12 @@
 
 use ballbar::wire::{Answer, Command, CompiledParameters, ToolPose, WhichSet};
 use ballbar::{Chain, JointVector, Kinematics, MAX_JOINTS, Pose, Vector3};
+use ballbar_calib::model::{JointLimits, Robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::errors::BoardError;
 use super::link::BoardLink;
-use crate::files::{JointLimits, Robot};
 
 /// The largest differences between the board's poses, in f32, and the host's, in f64 from the robot's file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

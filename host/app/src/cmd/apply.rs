@@ -4,6 +4,7 @@ mod previous;
 
 use ballbar::Chain;
 use ballbar::wire::{Answer, Command, ParameterSet, WhichSet};
+use ballbar_calib::model::{CalibrationVerdict, JointLimits, Robot};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -17,7 +18,7 @@ use crate::board::{
     BoardError, BoardLink, KinematicsDifference, NOMINAL_TRAVEL_M, RobotOnBoard, nominal_lvdt, parameter_set,
     rounding_of_kinematics, verify_kinematics,
 };
-use crate::files::{CalibrationVerdict, JointLimits, Robot};
+use crate::files::open_robot;
 use crate::text::one_line;
 
 /// Upload a calibrated robot to the board, and verify the board's kinematics against this program's
@@ -107,7 +108,7 @@ impl ApplyArgs {
             print(&report, self.output.json)?;
             return Ok(Outcome::Good);
         };
-        let robot = Robot::open(robot)?;
+        let robot = open_robot(robot)?;
         if !self.uncalibrated {
             check_calibrated(&robot)?;
         }
@@ -116,7 +117,7 @@ impl ApplyArgs {
         let mut link = self.port.connect()?;
         let (joints, encoders) = (robot.chain.joints(), link.hello().encoders);
         if joints > usize::from(encoders) {
-            return Err(ApplyError::TooManyJoints { robot: robot.source_name().to_owned(), joints, encoders }.into());
+            return Err(ApplyError::TooManyJoints { robot: robot.source.as_str().to_owned(), joints, encoders }.into());
         }
         let report = upload(&mut link, &robot, self.vectors as usize)?;
         print(&report, self.output.json)?;
@@ -126,7 +127,7 @@ impl ApplyArgs {
 
 /// A robot is put on the board when its fit was found to be good, with reservations or without.
 fn check_calibrated(robot: &Robot) -> Result<(), ApplyError> {
-    let name = || robot.source_name().to_owned();
+    let name = || robot.source.as_str().to_owned();
     match (&robot.calibration, robot.verdict()) {
         (_, Some(CalibrationVerdict::Calibrated | CalibrationVerdict::Reserved)) => Ok(()),
         (Some(_), None) => Err(ApplyError::NotJudged(name())),
@@ -143,7 +144,7 @@ fn check_rounding(robot: &Robot, set: &ParameterSet, vectors: usize) -> Result<(
     }
     let KinematicsDifference { position_m, axis_rad, .. } = rounding;
     let (position_um, axis_urad) = (position_m * 1e6, axis_rad * 1e6);
-    Err(ApplyError::Coarse { robot: robot.source_name().to_owned(), position_um, axis_urad })
+    Err(ApplyError::Coarse { robot: robot.source.as_str().to_owned(), position_um, axis_urad })
 }
 
 /// What the board uses; nothing where that is not to be believed.

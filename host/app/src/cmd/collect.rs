@@ -11,8 +11,15 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{Answer, Command};
+use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace, UnsafePlan};
 use clap::Args;
 use miette::Diagnostic;
+use mover::{Mover, MoverArgs};
+use operator::{Hand, Terminal};
+use picture::Still;
+use programs::Programs;
+use report::CollectReport;
+use session_files::SessionFiles;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
@@ -25,17 +32,11 @@ use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, ProgramOptions, TrackOptions, check_board,
     remove_lag,
 };
-use crate::plan::{Cell, CheckedPlan, Margins, Pace, UnsafePlan};
+use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run, SessionLock};
 use crate::units::m_from_mm;
-use mover::{Mover, MoverArgs};
-use operator::{Hand, Terminal};
-use picture::Still;
-use programs::Programs;
-use report::CollectReport;
-use session_files::SessionFiles;
 
 /// Walk a plan: move the robot from pose to pose, wait until it stands, and keep what the bar measures
 #[derive(Args)]
@@ -131,7 +132,7 @@ impl CollectArgs {
         let options = self.options()?;
         let files = SessionFiles::open(&self.session, self.plan.as_deref(), self.robot.as_deref(), self.rig.as_deref())?;
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
-        let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default())?;
+        let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default()).map_err(Remedied)?;
         let plan = CheckedPlan::new(&cell, &files.rows).map_err(ArgumentError::UnsafePlan)?;
 
         let mut mover = self.mover.open(files.robot.chain.joint_kinds())?;

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use ballbar::{JointKind, JointVector};
+use ballbar_calib::kinematics::{Compensation, Compensator, link_angles};
+use ballbar_calib::model::{CalibrationVerdict, Robot};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -12,8 +14,8 @@ use super::inputs::{ForceArgs, ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use super::table::{Columns, fixed};
-use crate::files::{CalibrationVerdict, FileKind, Output, Robot, Source, Target, compensated_csv, read_targets};
-use crate::kinematics::{Compensation, Compensator, link_angles};
+use crate::files::{FileKind, Output, Source, Target, compensated_csv, open_robot, pose_as_written, read_targets};
+use crate::remedies::Remedied;
 use crate::text::shown_path;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 
@@ -90,11 +92,11 @@ struct NotReached {
 
 impl CompensateArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        let (robot, nominal) = (Robot::open(&self.robot)?, Robot::open(&self.nominal)?);
+        let (robot, nominal) = (open_robot(&self.robot)?, open_robot(&self.nominal)?);
         if robot.chain.joint_kinds() != nominal.chain.joint_kinds() {
             return Err(DifferentJoints(self.robot.clone(), self.nominal.clone()).into());
         }
-        let compensator = Compensator::new(&robot, &nominal)?;
+        let compensator = Compensator::new(&robot, &nominal).map_err(Remedied)?;
         let start = self.start(&nominal, &compensator)?;
         let targets = read_targets(&Source::read_rows(&self.targets)?, &nominal)?;
         let (done, not_reached) = compensated(&robot, &compensator, &targets, start);
@@ -198,7 +200,7 @@ fn compensated(
     let (mut done, mut not_reached) = (Vec::new(), Vec::new());
     let mut before = start;
     for target in targets {
-        match compensator.compensate(&target.goal, &before, |q| as_written(robot, q)) {
+        match compensator.compensate(&target.goal, &before, |q| as_written(robot, q), pose_as_written) {
             Ok(found) => {
                 before = found.nominal_q;
                 done.push((target.line, found));

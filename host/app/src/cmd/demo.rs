@@ -4,6 +4,11 @@ mod bench;
 
 use std::path::{Path, PathBuf};
 
+use ballbar_calib::assess::{Assessment, Evidence};
+use ballbar_calib::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
+use ballbar_calib::model::{Dataset, Robot};
+use ballbar_calib::simulate::tool_error;
+use bench::{Bench, SIGMA_MM, Scene};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -14,14 +19,11 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated, write_file, write_files};
 use super::table::Columns;
-use crate::assess::{Assessment, Evidence};
 use crate::board::{StreamLosses, rms_kinematics};
-use crate::files::{Dataset, FileKind, Output, RIGS, ROBOTS, Rig, Robot, Source};
-use crate::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
-use crate::simulate::tool_error;
+use crate::files::{FileKind, Output, RIGS, Source, append_poses, open_rig, open_robot, robot_source};
+use crate::remedies::Remedied;
 use crate::text::{one_line, shown_path};
 use crate::units::mm_from_m;
-use bench::{Bench, SIGMA_MM, Scene};
 
 /// See a whole calibration without hardware: stream, settle, fit, validate, apply, verify
 #[derive(Args)]
@@ -99,7 +101,7 @@ const BOARD_POSES: usize = 300;
 impl DemoArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let scene =
-            Scene { design: Robot::open("puma560")?, truth: Robot::open("puma560-optimised")?, rig: Rig::open("triangles")? };
+            Scene { design: open_robot("puma560")?, truth: open_robot("puma560-optimised")?, rig: open_rig("triangles")? };
         let Scene { design, rig, .. } = &scene;
         self.prepare_folder()?;
 
@@ -108,13 +110,14 @@ impl DemoArgs {
         let other_shells = bench.collect("61 cm shells", OTHER_BAR_MM, self.seed.wrapping_add(1))?;
         let (fitted_name, other_name) = ("poses-460.csv", "poses-610.csv");
         let mut fitted_poses = Dataset::default();
-        fitted_poses.append(&Source::new(fitted_name, &fitted_shells.csv), design, rig)?;
+        append_poses(&mut fitted_poses, &Source::new(fitted_name, &fitted_shells.csv), design, rig)?;
         let mut other_poses = Dataset::default();
-        other_poses.append(&Source::new(other_name, &other_shells.csv), design, rig)?;
+        append_poses(&mut other_poses, &Source::new(other_name, &other_shells.csv), design, rig)?;
 
-        let fit = fit(design, &fitted_poses, &FitOptions::default())?;
+        let design_source = robot_source("puma560")?;
+        let fit = fit(design, &fitted_poses, &FitOptions::default()).map_err(Remedied)?;
         let files = [
-            ("design.toml", FileKind::Robot, Source::named_or_read("puma560", &ROBOTS, "robot")?.text().to_owned()),
+            ("design.toml", FileKind::Robot, design_source.text().to_owned()),
             ("rig.toml", FileKind::Rig, Source::named_or_read("triangles", &RIGS, "rig")?.text().to_owned()),
             (fitted_name, FileKind::Poses, fitted_shells.csv),
             (other_name, FileKind::Poses, other_shells.csv),
@@ -126,11 +129,11 @@ impl DemoArgs {
         let unseen = [(other_name.to_owned(), &other_poses)];
         let evidence = Evidence { robot: design, rig, dataset: &fitted_poses, fit: &fit, unseen: &unseen, max_rms_m: None };
         let assessment = Assessment::new(&evidence);
-        if !write_calibrated(&calibrated_path, false, &evidence, &assessment)? {
+        if !write_calibrated(&calibrated_path, false, &design_source, &evidence, &assessment)? {
             return Err(RefusedError(assessment.reasons.join(" ")).into());
         }
 
-        let board = put_on_board(&mut bench, &scene.truth, &Robot::open(&calibrated_path.to_string_lossy())?)?;
+        let board = put_on_board(&mut bench, &scene.truth, &open_robot(&calibrated_path.to_string_lossy())?)?;
         let names = files.iter().map(|(name, ..)| *name).chain([calibrated_name]);
         let names = names.chain([SUMMARY_NAME]).map(|name| self.out.join(name).display().to_string()).collect();
         let losses = bench.link.losses();

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use ballbar_calib::kinematics::NearlyParallel;
+use ballbar_calib::model::CalibrationVerdict;
 use clap::{Args, ValueEnum};
 use miette::Diagnostic;
 use serde::Serialize;
@@ -11,8 +13,7 @@ use super::inputs::{ForceArgs, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use crate::export::{Format, JointZero, export};
-use crate::files::{CalibrationVerdict, Output, Robot};
-use crate::kinematics::NearlyParallel;
+use crate::files::{Output, open_robot};
 use crate::text::{one_line, shown_path};
 use crate::units::mm_from_m;
 
@@ -84,7 +85,7 @@ impl ExportArgs {
         if self.joint_zero.is_some() && !matches!(self.format, Format::Urdf | Format::Ros2) {
             return Err(NoUrdf.into());
         }
-        let robot = Robot::open(&self.robot)?;
+        let robot = open_robot(&self.robot)?;
         let exported = export(&robot, self.format, self.joint_zero.unwrap_or_default())?;
         for remark in &exported.remarks {
             warn(remark);

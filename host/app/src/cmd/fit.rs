@@ -3,18 +3,20 @@
 use std::path::PathBuf;
 
 use ballbar::Damping;
+use ballbar_calib::assess::{Answer, Assessment, Evidence, Refusal};
+use ballbar_calib::identify::{ALIKE, ConvergenceTest, Fit, FitOptions, FittedParameter, OutlierTest, Status, fit, remarks};
+use ballbar_calib::model::{Dataset, Rig};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::hold::parse_hold;
 use super::hold_out::HeldOutRows;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::lines::{NotIdentified, PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated};
 use super::table::{Columns, fixed};
-use crate::assess::{Answer, Assessment, Evidence, Refusal};
-use crate::files::{Dataset, Rig};
-use crate::identify::{ALIKE, ConvergenceTest, Fit, FitOptions, FittedParameter, Hold, OutlierTest, Status, fit, remarks};
+use crate::remedies::Remedied;
 use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
 
@@ -157,7 +159,7 @@ struct OutlierLine {
 
 impl FitArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        let hold: Hold = self.hold.parse()?;
+        let hold = parse_hold(&self.hold)?;
         let damping = match self.damping {
             DampingArg::Identity => Damping::Identity,
             DampingArg::Diagonal => Damping::Diagonal,
@@ -165,7 +167,7 @@ impl FitArgs {
         check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
         let Measured { robot, rig, dataset, .. } = &measured;
-        let fit = fit(robot, dataset, &FitOptions { hold, damping })?;
+        let fit = fit(robot, dataset, &FitOptions { hold, damping }).map_err(Remedied)?;
         let unseen: Vec<(String, &Dataset)> = measured.unseen().into_iter().collect();
         let evidence = Evidence { robot, rig, dataset, fit: &fit, unseen: &unseen, max_rms_m: self.max_rms_mm.map(m_from_mm) };
         let assessment = Assessment::new(&evidence);
@@ -173,7 +175,7 @@ impl FitArgs {
         let mut report = FitReport::new(&measured, &fit, &assessment);
         if let Some(path) = &self.out {
             report.asked_out = Some(path.display().to_string());
-            if write_calibrated(path, self.replace.force, &evidence, &assessment)? {
+            if write_calibrated(path, self.replace.force, &measured.robot_source, &evidence, &assessment)? {
                 report.out = report.asked_out.clone();
             }
         }
@@ -295,7 +297,7 @@ fn signed(change: f64, decimals: usize) -> String {
 
 fn pairing_changes(rig: &Rig, fit: &Fit) -> Vec<PairingChange> {
     let pairs = fit.initial_by_pairing.iter().zip(&fit.fitted_by_pairing);
-    let change = |(initial, fitted): (&crate::identify::PairingResiduals, _)| PairingChange {
+    let change = |(initial, fitted): (&ballbar_calib::identify::PairingResiduals, _)| PairingChange {
         initial_rms_mm: mm_from_m(initial.summary.rms_m),
         fitted: PairingLine::new(rig, fitted),
     };
@@ -303,7 +305,7 @@ fn pairing_changes(rig: &Rig, fit: &Fit) -> Vec<PairingChange> {
 }
 
 fn outlier_lines(dataset: &Dataset, fit: &Fit) -> Vec<OutlierLine> {
-    let line = |outlier: &crate::identify::Outlier| OutlierLine {
+    let line = |outlier: &ballbar_calib::identify::Outlier| OutlierLine {
         row: dataset.rows[outlier.row].number,
         place: dataset.place(outlier.row),
         residual_mm: mm_from_m(fit.residuals[outlier.row].value_m),

@@ -1,15 +1,15 @@
 //! `host-cal fk`: where the tool is.
 
+use ballbar::Kinematics;
+use ballbar_calib::kinematics::link_angles;
+use ballbar_calib::model::Robot;
 use clap::Args;
 use serde::Serialize;
-
-use ballbar::Kinematics;
 
 use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn};
-use crate::files::Robot;
-use crate::kinematics::link_angles;
+use crate::files::open_robot;
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// Pose of the tool at given joint values (forward kinematics)
@@ -39,7 +39,7 @@ struct FkReport {
 
 impl FkArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        let robot = Robot::open(&self.robot)?;
+        let robot = open_robot(&self.robot)?;
         let report = self.report(&robot)?;
         print(&report, self.output.json)?;
         Ok(Outcome::Good)

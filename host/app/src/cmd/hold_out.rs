@@ -3,16 +3,16 @@
 use std::fmt;
 use std::str::FromStr;
 
+use ballbar::Chain;
+use ballbar_calib::identify::{ResidualSummary, residuals};
+use ballbar_calib::model::{Dataset, PairingId, PoseRow, Rig, Robot};
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
 use super::inputs::parse_pairings;
 use super::outcome::CommandError;
-use crate::files::{Dataset, PairingId, PoseRow, Rig, Robot};
-use crate::identify::{ResidualSummary, residuals};
 use crate::units::{m_from_mm, mm_from_m, tidy};
-use ballbar::Chain;
 
 /// Conditions of which a row has to meet one to be held out.
 #[derive(Clone, Debug)]

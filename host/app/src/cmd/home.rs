@@ -1,6 +1,8 @@
 //! `host-cal home`: tell the board where the joints stand.
 
 use ballbar::wire::Command;
+use ballbar::{JointKind, JointVector};
+use ballbar_calib::model::Robot;
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -11,9 +13,8 @@ use super::outcome::{CommandError, Outcome};
 use super::port::{PortArgs, check_kinds};
 use super::report::{Report, print, warn};
 use crate::board::RobotOnBoard;
-use crate::files::Robot;
+use crate::files::open_robot;
 use crate::units::{ScreenUnit, joints_text};
-use ballbar::{JointKind, JointVector};
 
 /// Tell the board where the joints stand (its encoders count from there)
 #[derive(Args)]
@@ -58,7 +59,7 @@ impl HomeArgs {
         if let Some(value) = self.q.iter().find(|value| !value.is_finite()) {
             return Err(ListError::Number { flag: "--q", found: value.to_string(), expected: "finite numbers" }.into());
         }
-        let limits = self.robot.as_deref().map(Robot::open).transpose()?;
+        let limits = self.robot.as_deref().map(open_robot).transpose()?;
         let mut link = self.port.connect()?;
         let (robot, _) = RobotOnBoard::read(&mut link)?.ok_or(HomeError::NoParameters)?;
         let kinds = robot.kinds();

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use ballbar_calib::model::{Dataset, PairingId, Rig, Robot, RowWarning};
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
@@ -9,7 +10,7 @@ use thiserror::Error;
 use super::hold_out::HoldOut;
 use super::outcome::CommandError;
 use super::report::warn;
-use crate::files::{Dataset, PairingId, Rig, Robot, RowWarning, Source};
+use crate::files::{Source, open_rig, parse_robot, read_poses, robot_source};
 use crate::session::{POSES_NAME, RIG_NAME, ROBOT_NAME};
 
 /// `--json`.
@@ -49,6 +50,8 @@ pub(super) struct MeasuredArgs {
 /// What the arguments named.
 pub(super) struct Measured {
     pub(super) robot: Robot,
+    /// Its text.
+    pub(super) robot_source: Source,
     pub(super) rig: Rig,
     /// The rig's file, or built-in name.
     pub(super) rig_name: String,
@@ -69,11 +72,12 @@ impl Measured {
 impl MeasuredArgs {
     /// Reads the files and says on stderr what may be wrong with them.
     pub(super) fn read(&self) -> Result<Measured, CommandError> {
-        let robot = Robot::open(&self.of_session(self.robot.as_ref(), "--robot", ROBOT_NAME)?)?;
+        let robot_source = robot_source(&self.of_session(self.robot.as_ref(), "--robot", ROBOT_NAME)?)?;
+        let robot = parse_robot(&robot_source)?;
         let rig_name = self.of_session(self.rig.as_ref(), "--rig", RIG_NAME)?;
-        let rig = Rig::open(&rig_name)?;
+        let rig = open_rig(&rig_name)?;
         let files: Vec<PathBuf> = self.poses.iter().map(|path| poses_of(path)).collect::<Result<_, _>>()?;
-        let dataset = Dataset::read(files.iter().map(PathBuf::as_path), &robot, &rig)?;
+        let dataset = read_poses(files.iter().map(PathBuf::as_path), &robot, &rig)?;
         let warnings = summarise(&dataset, &dataset.warnings(&robot, &rig));
         for warning in &warnings {
             warn(warning);
@@ -85,7 +89,7 @@ impl MeasuredArgs {
                 (Some((rule.clone(), held_out)), others)
             }
         };
-        Ok(Measured { robot, rig, rig_name, dataset, held_out, warnings })
+        Ok(Measured { robot, robot_source, rig, rig_name, dataset, held_out, warnings })
     }
 
     /// What was given, or else the file of that name in the sessions; they have to agree.
@@ -222,8 +226,9 @@ pub(super) fn parse_pairings(text: &str, rig: &Rig) -> Result<Vec<PairingId>, Co
     for word in text.split(',').map(str::trim) {
         let ends = word.split_once(':').and_then(|(chuck, sphere)| Some((rig.chuck(chuck)?, rig.sphere(sphere)?)));
         let Some((chuck, sphere)) = ends else {
-            let names =
-                |points: &[crate::files::NamedPoint]| points.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
+            let names = |points: &[ballbar_calib::model::NamedPoint]| {
+                points.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ")
+            };
             return Err(ListError::Pairing(word.to_owned(), names(&rig.chucks), names(&rig.spheres)).into());
         };
         let pairing = PairingId { chuck, sphere };

@@ -1,10 +1,10 @@
 //! Lines that several reports have in common.
 
+use ballbar_calib::identify::{Finding, Identifiability, PairingResiduals, Residual};
+use ballbar_calib::model::{Dataset, Rig};
 use serde::Serialize;
 
 use super::table::{Columns, fixed};
-use crate::files::{Dataset, Rig};
-use crate::identify::{Finding, Identifiability, PairingResiduals, Residual};
 use crate::units::mm_from_m;
 
 /// Residuals of one pairing, for tables and JSON.

@@ -12,6 +12,7 @@ mod demo;
 mod export;
 mod fit;
 mod fk;
+mod hold;
 mod hold_out;
 mod home;
 mod import;

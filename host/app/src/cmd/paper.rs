@@ -1,5 +1,6 @@
 //! `host-cal paper`: the paper's experiment beside the paper's numbers.
 
+use ballbar_calib::identify::{Spectrum, bound_by_ends};
 use clap::Args;
 use serde::Serialize;
 
@@ -7,7 +8,7 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, progress};
 use super::table::{Columns, fixed};
-use crate::identify::{Spectrum, bound_by_ends};
+use crate::files::open_robot;
 use crate::paper::{Experiment, RankClass, Recovered, run, stated};
 use crate::units::{ScreenUnit, mm_from_m};
 
@@ -94,7 +95,7 @@ impl PaperArgs {
 
 impl PaperReport {
     fn new(seed: u64, experiment: &Experiment) -> Result<Self, CommandError> {
-        let design = crate::files::Robot::open("puma560")?;
+        let design = open_robot("puma560")?;
         let class = |class: &RankClass| ClassLine {
             pairings: class.pairings,
             chucks: class.chucks,

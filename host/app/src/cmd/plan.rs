@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use ballbar_calib::model::{Rig, Robot};
+use ballbar_calib::plan::{Cell, CheckFound, Grid, Margins, Pace, PlanOptions, PlanRow, Progress, Stage, check, plan};
 use clap::Args;
 use indicatif::ProgressBar;
 
@@ -11,8 +13,8 @@ use super::outcome::{CommandError, Outcome};
 use super::plan_margins::{CheckReport, Least};
 use super::plan_report::PlanReport;
 use super::report::{print, progress, warn, write_file};
-use crate::files::{FileKind, Output, PlanRow, Rig, Robot, Source, read_plan, write_plan};
-use crate::plan::{Cell, CheckFound, Grid, Margins, Pace, PlanOptions, Progress, Stage, check, plan};
+use crate::files::{FileKind, Output, Source, open_rig, open_robot, read_plan, write_plan};
+use crate::remedies::Remedied;
 use crate::units::{m_from_mm, mm_from_m};
 
 /// Plan poses on hemispherical shells, and collision-free ways between them
@@ -101,8 +103,8 @@ impl PlanArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let margins = self.margins.read()?;
         let pace = self.pace.read()?;
-        let robot = Robot::open(&self.robot)?;
-        let rig = Rig::open(&self.rig)?;
+        let robot = open_robot(&self.robot)?;
+        let rig = open_rig(&self.rig)?;
         let travel_m = rig.bar.as_ref().ok_or(ListError::NoTravel)?.travel_m;
         if travel_m / 2.0 <= margins.travel_m {
             let expected = "less than half of the bar's travel";
@@ -133,7 +135,7 @@ impl PlanArgs {
         let bar = progress(1, "planning");
         let plan = plan(robot, rig, &options, &|now| show(&bar, now));
         bar.finish_and_clear();
-        let plan = plan?;
+        let plan = plan.map_err(Remedied)?;
         let planning_s = start.elapsed().as_secs_f64();
         let found = self.checked(robot, rig, travel_m, margins, pace, &plan.rows)?;
 
@@ -180,7 +182,7 @@ impl PlanArgs {
     ) -> Result<CheckFound, CommandError> {
         const STEP: f64 = 0.01;
         const ROBOTS: usize = 1000;
-        let cell = Cell::new(robot, rig, travel_m, margins, pace)?;
+        let cell = Cell::new(robot, rig, travel_m, margins, pace).map_err(Remedied)?;
         let bar = progress(1, "checking");
         let found = check(&cell, rows, STEP, ROBOTS, self.seed.wrapping_add(1), &|now| show(&bar, now));
         bar.finish_and_clear();

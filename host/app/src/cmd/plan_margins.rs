@@ -1,12 +1,12 @@
 //! The margins that were asked for and those that fine steps show, and a plan that is only looked at.
 
 use ballbar::JointKind;
+use ballbar_calib::model::Robot;
+use ballbar_calib::plan::{CheckFound, Margins, PlanRow, RowKind};
 use serde::Serialize;
 
 use super::report::Report;
 use super::table::{Columns, fixed};
-use crate::files::{PlanRow, Robot, RowKind};
-use crate::plan::{CheckFound, Margins};
 use crate::units::{mm_from_m, tidy};
 
 /// What has to be left.

@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
+use ballbar_calib::identify::remarks;
+use ballbar_calib::model::{Rig, Robot};
+use ballbar_calib::plan::{
+    CheckFound, Comparison, Plan, PlanOptions, PlanRow, Quality, RowKind, RowMargins, ShellSummary, Unfit,
+};
 use serde::Serialize;
 
 use super::plan_margins::{Least, MarginLine};
 use super::report::Report;
 use super::table::{Columns, fixed};
-use crate::files::{PlanRow, Rig, Robot, RowKind, RowMargins};
-use crate::identify::remarks;
-use crate::plan::{CheckFound, Comparison, Plan, PlanOptions, Quality, ShellSummary, Unfit};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 
@@ -185,8 +187,10 @@ impl From<&RowMargins> for RowMarginLine {
 
 impl ShellLine {
     fn new(rig: &Rig, shell: &ShellSummary) -> Self {
-        let reason =
-            |(hindrance, points): &(crate::plan::Hindrance, usize)| Reason { why: hindrance.to_string(), points: *points };
+        let reason = |(hindrance, points): &(ballbar_calib::plan::Hindrance, usize)| Reason {
+            why: hindrance.to_string(),
+            points: *points,
+        };
         Self {
             pairing: rig.pairing_name(shell.pairing),
             bar_mm: tidy(mm_from_m(shell.bar_m)),

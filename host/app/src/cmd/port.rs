@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use ballbar::{JointKind, StillnessCriteria};
+use ballbar_calib::model::Robot;
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
@@ -12,7 +13,6 @@ use super::outcome::{CommandError, INTERRUPTED};
 use super::screen::give_back;
 use crate::board::{BAUD, BoardLink};
 use crate::deadline::StopFlag;
-use crate::files::Robot;
 
 /// Which board.
 #[derive(Args)]
@@ -47,7 +47,7 @@ pub(super) fn check_kinds(robot: &Robot, on_board: &[JointKind]) -> Result<(), O
     if kinds == on_board {
         return Ok(());
     }
-    Err(OtherRobot { robot: robot.source_name().to_owned(), found: kinds.len(), expected: on_board.len() })
+    Err(OtherRobot { robot: robot.source.as_str().to_owned(), found: kinds.len(), expected: on_board.len() })
 }
 
 /// When the arm stands still.

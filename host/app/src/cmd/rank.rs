@@ -1,5 +1,6 @@
 //! `host-cal rank`: what a set of poses can identify.
 
+use ballbar_calib::identify::{Identifiability, bound_by_pairings, remarks};
 use clap::Args;
 use serde::Serialize;
 
@@ -8,7 +9,6 @@ use super::lines::NotIdentified;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
 use super::table::Columns;
-use crate::identify::{Identifiability, bound_by_pairings, remarks};
 use crate::units::mm_from_m;
 
 /// How many parameters these poses can identify, and which they cannot

@@ -8,11 +8,13 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::out;
+use crate::files::{Source, calibrated_toml, calibration};
+
 pub(super) use super::out::warn;
 use super::outcome::CommandError;
-use crate::assess::{Assessment, Evidence};
 use crate::files::{FileKind, Output, PendingFile, commit_all, write_atomically};
 use crate::text::visible_json;
+use ballbar_calib::assess::{Assessment, Evidence};
 
 /// A result that can be shown as text and as JSON.
 pub(super) trait Report: Serialize {
@@ -91,13 +93,13 @@ struct EditError(String, String);
 pub(super) fn write_calibrated(
     path: &Path,
     force: bool,
+    source: &Source,
     evidence: &Evidence<'_>,
     assessment: &Assessment,
 ) -> Result<bool, CommandError> {
-    let Some((chain, calibration)) = assessment.calibration(evidence) else { return Ok(false) };
-    let robot = evidence.robot;
-    let broken = |error: toml_edit::TomlError| CommandError::output(EditError(robot.source_name().to_owned(), error.to_string()));
-    let text = robot.calibrated_toml(chain, &calibration).map_err(broken)?;
+    let Some((chain, calibration)) = calibration(evidence, assessment) else { return Ok(false) };
+    let broken = |error: toml_edit::TomlError| CommandError::output(EditError(source.name().to_owned(), error.to_string()));
+    let text = calibrated_toml(source, chain, &calibration).map_err(broken)?;
     write_file(Output { path, kind: FileKind::Robot, force }, &text)?;
     Ok(true)
 }

@@ -3,17 +3,20 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use ballbar_calib::assess::{Answer, Assessment, Evidence};
+use ballbar_calib::identify::{FitOptions, fit, remarks};
+use ballbar_calib::model::{Dataset, PoseRow};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::hold::parse_hold;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm, poses_of};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_files};
-use crate::assess::{Answer, Assessment, Evidence};
-use crate::files::{Dataset, FileKind, Output, PoseRow};
-use crate::identify::{FitOptions, Hold, fit, remarks};
+use crate::files::{FileKind, Output, read_poses};
+use crate::remedies::Remedied;
 use crate::report::{Facts, Figure, Inputs, figures, html, parameters_table};
 use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
@@ -102,13 +105,13 @@ struct SeenError {
 
 impl ReportArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        let hold: Hold = self.hold.parse()?;
+        let hold = parse_hold(&self.hold)?;
         check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
         let others = self.others(&measured)?;
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;
-        let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, ..FitOptions::default() })?;
+        let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, ..FitOptions::default() }).map_err(Remedied)?;
 
         let remarks = remarks(&measured.robot.chain, &measured.dataset, &measured.rig, &measured.robot.limits);
         let unseen: Vec<(String, &Dataset)> =
@@ -156,7 +159,7 @@ impl ReportArgs {
         };
         let fitted: HashSet<_> = measured.dataset.rows.iter().map(key).collect();
         let read = |path: &PathBuf| {
-            let rows = Dataset::read([poses_of(path)?.as_path()], &measured.robot, &measured.rig)?;
+            let rows = read_poses([poses_of(path)?.as_path()], &measured.robot, &measured.rig)?;
             let seen = rows.rows.iter().filter(|row| fitted.contains(&key(row))).count();
             match (rows.rows.len(), seen) {
                 (0, _) => Err(EmptyError(path.clone()).into()),

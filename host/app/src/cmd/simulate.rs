@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 
+use ballbar_calib::model::{PairingId, PoseRow, Rig, Robot};
+use ballbar_calib::simulate::{ShellPose, Shells};
 use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, progress, write_file};
-use crate::files::{FileKind, Output, PairingId, PoseRow, Rig, Robot, write_poses};
-use crate::simulate::{ShellPose, Shells};
+use crate::files::{FileKind, Output, open_rig, open_robot, write_poses};
+use crate::remedies::Remedied;
 use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
 
@@ -88,9 +90,9 @@ struct RowLine {
 
 impl SimulateArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        let truth = Robot::open(&self.robot)?;
-        let planned_with = self.plan_robot.as_deref().map_or_else(|| Ok(truth.clone()), Robot::open)?;
-        let rig = Rig::open(&self.rig)?;
+        let truth = open_robot(&self.robot)?;
+        let planned_with = self.plan_robot.as_deref().map_or_else(|| Ok(truth.clone()), open_robot)?;
+        let rig = open_rig(&self.rig)?;
         let report = self.simulate(&truth, &planned_with, &rig)?;
         if let Some(path) = &self.out {
             write_file(Output { path, kind: FileKind::Poses, force: self.replace.force }, &report.csv)?;
@@ -117,7 +119,7 @@ impl SimulateArgs {
                 sigma_m: m_from_mm(self.sigma_mm),
                 seed: self.seed.wrapping_add(i as u64),
             };
-            poses.extend(shells.simulate(|| bar.inc(1))?);
+            poses.extend(shells.simulate(|| bar.inc(1)).map_err(Remedied)?);
         }
         bar.finish_and_clear();
         let rows: Vec<PoseRow> = poses.iter().map(|pose| pose.row.clone()).collect();

@@ -8,26 +8,27 @@ mod watch;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use account::Account;
 use ballbar::wire::{Command, FrameCounts, StreamSelection};
+use ballbar_calib::model::{Rig, Robot};
 use clap::Args;
+use live::{Latest, Model};
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
+use watch::Watch;
 
 use super::inputs::{OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
 use super::port::{PortArgs, StillnessArgs, check_kinds};
 use super::report::{Report, print, warn};
 use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
-use crate::files::{Rig, Robot};
+use crate::files::{open_rig, open_robot};
 use crate::session::{
     Connection, DescriptionError, LockError, LogError, PoseFileError, ROBOT_NAME, RecordError, Recorder, Run, SessionLock,
 };
 use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
-use account::Account;
-use live::{Latest, Model};
-use watch::Watch;
 
 /// Watch a board: joint angles, length, losses; record a session
 #[derive(Args)]
@@ -174,10 +175,10 @@ impl StreamArgs {
     /// The robot whose limits are watched, as far as anybody has said.
     fn limits(&self) -> Result<Option<Robot>, CommandError> {
         if let Some(robot) = &self.robot {
-            return Ok(Some(Robot::open(robot)?));
+            return Ok(Some(open_robot(robot)?));
         }
         let kept = self.session.as_ref().map(|session| session.join(ROBOT_NAME)).filter(|path| path.is_file());
-        Ok(kept.map(|path| Robot::open(&path.to_string_lossy())).transpose()?)
+        Ok(kept.map(|path| open_robot(&path.to_string_lossy())).transpose()?)
     }
 
     /// Tells the board what to do; again after it was away.
@@ -201,7 +202,7 @@ impl StreamArgs {
         }
         let bad_pairing = || StreamError::BadPairing(pairing.clone());
         if let Some(rig) = &self.rig {
-            let rig = Rig::open(rig)?;
+            let rig = open_rig(rig)?;
             if parse_pairings(pairing, &rig)?.len() != 1 {
                 return Err(bad_pairing().into());
             }
@@ -218,7 +219,7 @@ impl StreamArgs {
     /// What computes lengths, when it is known what the bar joins and where.
     fn model(&self, robot: Option<&RobotOnBoard>) -> Result<Option<Model>, CommandError> {
         let (Some(rig), Some(pairing), Some(robot)) = (&self.rig, &self.pairing, robot) else { return Ok(None) };
-        let rig = Rig::open(rig)?;
+        let rig = open_rig(rig)?;
         let pairing = parse_pairings(pairing, &rig)?.first().map(|&id| rig.pairing(id));
         Ok(pairing.and_then(|pairing| Model::new(robot, pairing)))
     }

@@ -1,5 +1,7 @@
 //! `host-cal validate`: residuals of poses that a fit has not seen.
 
+use ballbar_calib::identify::{ResidualSummary, by_pairing, residuals};
+use ballbar_calib::model::CalibrationVerdict;
 use clap::Args;
 use serde::Serialize;
 
@@ -8,8 +10,6 @@ use super::lines::{PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
 use super::table::{Columns, fixed};
-use crate::files::CalibrationVerdict;
-use crate::identify::{ResidualSummary, by_pairing, residuals};
 use crate::units::mm_from_m;
 
 /// Residuals on poses that the fit has not seen

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use ballbar_calib::model::{PairingId, Rig, Robot};
+use ballbar_calib::simulate::Shells;
 use clap::{Args, ValueEnum};
 use miette::Diagnostic;
 use serde::Serialize;
@@ -16,9 +18,9 @@ use super::outcome::{CommandError, Outcome};
 use super::port::EndRequest;
 use super::report::{Report, print, progress};
 use crate::board::{NOMINAL_TRAVEL_M, parameter_set};
-use crate::files::{PairingId, Rig, Robot};
+use crate::files::{open_rig, open_robot};
+use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
-use crate::simulate::Shells;
 use crate::units::m_from_mm;
 use crate::virtual_board::{
     Controller, ControllerOptions, Driven, Driver, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions, driver,
@@ -150,7 +152,7 @@ const READER_PATIENCE: Duration = Duration::from_secs(5);
 impl VirtualBoardArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         self.check()?;
-        let (truth, design, rig) = (Robot::open(&self.robot)?, Robot::open(&self.design)?, Rig::open(&self.rig)?);
+        let (truth, design, rig) = (open_robot(&self.robot)?, open_robot(&self.design)?, open_rig(&self.rig)?);
         let pairings = self.pairings.as_ref().map_or_else(|| Ok(rig.all_pairings()), |list| parse_pairings(list, &rig))?;
         if truth.chain.joint_kinds() != design.chain.joint_kinds() {
             return refuse("--design", design.name.clone(), "a robot with the same joints as --robot");
@@ -207,7 +209,7 @@ impl VirtualBoardArgs {
         };
         let speed = JointSpeed { revolute_rad_s: self.speed_deg_s.to_radians(), ..JointSpeed::default() };
         let bar = progress((pairings.len() * shells.per_pairing) as u64, "planning poses");
-        let script = Script::from_shells(&shells, self.dwell_s, speed, || bar.inc(1))?;
+        let script = Script::from_shells(&shells, self.dwell_s, speed, || bar.inc(1)).map_err(Remedied)?;
         bar.finish_and_clear();
         Ok(script)
     }

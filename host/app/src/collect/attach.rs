@@ -3,12 +3,12 @@
 use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
+use ballbar_calib::model::PairingId;
 
 use super::collector::{Bar, Collector};
 use super::errors::CollectError;
 use super::ledger::Joined;
 use super::operator::{Event, Wish};
-use crate::files::PairingId;
 use crate::units::{mm_from_m, tidy};
 
 /// How long the LVDT may take to show a bar that was attached.

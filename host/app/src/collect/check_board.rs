@@ -1,10 +1,10 @@
 //! Is the board's robot the plan's?
 
 use ballbar::Coupling;
+use ballbar_calib::model::Robot;
 
 use super::errors::CollectError;
 use crate::board::RobotOnBoard;
-use crate::files::Robot;
 
 /// A board counts as the plan's robot does, and knows where it is.
 ///

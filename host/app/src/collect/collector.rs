@@ -4,6 +4,7 @@ use std::collections::{HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use ballbar::JointVector;
+use ballbar_calib::plan::Cell;
 
 use super::Nearness;
 use super::board_watch::{BoardWatch, Stand, View};
@@ -16,7 +17,6 @@ use super::operator::{Event, Measured, Operator, Wish};
 use super::repeat::Repeat;
 use super::track::TrackOptions;
 use crate::board::{BoardError, StreamLosses};
-use crate::plan::Cell;
 use crate::robot_link::{JointSpeed, LinkError};
 use crate::session::{Connection, MeasuredPose};
 use crate::units::mm_from_m;

@@ -4,13 +4,13 @@
 //! its rows, or was stopped between two; it goes to the next row to measure row by row.
 
 use ballbar::JointVector;
+use ballbar_calib::plan;
 
 use super::board_watch::Stand;
 use super::collector::{Bar, Collector, Ended, Rest};
 use super::errors::CollectError;
 use super::go::Go;
 use super::ledger::{Joined, joined};
-use crate::plan;
 use crate::robot_link::RobotLink;
 use crate::units::joints_text;
 

@@ -4,11 +4,12 @@
 //! robot's parameters, with the column `−ḋ`: lengths that grow and lengths that shrink at the same place tell it from all of them.
 
 use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement, Parameter};
+use ballbar_calib::identify::{FitError, FitOptions, Identifiability, fit};
+use ballbar_calib::model::{Dataset, Rig, Robot};
 use nalgebra::{DMatrix, DVector};
 
 use super::errors::CollectError;
-use crate::files::{Dataset, Problem, Rig, Robot};
-use crate::identify::{FitError, FitOptions, Identifiability, fit};
+use crate::files::{Problem, read_poses};
 use crate::session::{POSES_NAME, PoseFile, RecordError, SessionLock};
 
 /// The LVDT's lag.
@@ -61,7 +62,7 @@ pub fn remove_lag(lock: &SessionLock, robot: &Robot, rig: &Rig) -> Result<Option
     if !path.is_file() {
         return Ok(None);
     }
-    let dataset = match Dataset::read([path.as_path()], robot, rig) {
+    let dataset = match read_poses([path.as_path()], robot, rig) {
         Ok(dataset) => dataset,
         Err(error) if matches!(error.problem(), Problem::NoRows(_)) => return Ok(None),
         Err(error) => return Err(error.into()),

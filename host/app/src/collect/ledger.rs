@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
-use crate::files::{PairingId, PlanRow, RowKind};
-use crate::plan::{Cell, CheckedPlan};
+use ballbar_calib::model::PairingId;
+use ballbar_calib::plan::{Cell, CheckedPlan, PlanRow, RowKind};
 
 /// What became of a row so far.
 #[derive(Clone, Debug, PartialEq, Eq)]

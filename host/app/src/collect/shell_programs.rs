@@ -1,8 +1,8 @@
 //! A plan as programs of a controller: for each shell one that brings the robot there, without the bar, and one that measures.
 
+use ballbar_calib::plan::{CheckedPlan, PlanRow, RowKind};
+
 use super::ledger::shells;
-use crate::files::{PlanRow, RowKind};
-use crate::plan::CheckedPlan;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::program::{ControllerSetup, Program, ProgramStep};
 use crate::session::Connection;

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 use ballbar::JointKind;
+use ballbar_calib::model::Robot;
 
 use super::{model_lines, origin};
-use crate::files::Robot;
 
 /// Six numbers a link: x, y, z, alpha, beta, gamma.
 fn links(robot: &Robot) -> Vec<[f64; 6]> {

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use ballbar::{JointKind, Parameter};
+use ballbar_calib::model::Robot;
 use serde::Serialize;
 
 use super::{MODEL, model_lines, origin};
-use crate::files::Robot;
 use crate::units::{ScreenUnit, as_in_a_file};
 
 /// A robot for JSON and YAML, metres and radians.
@@ -49,7 +49,7 @@ impl<'a> RobotData<'a> {
             gamma_rad: link.gamma_rad,
         };
         let joints = (0..chain.joints()).filter_map(|i| chain.joint(i)).zip(&robot.limits);
-        let joint = |(joint, limits): (ballbar::Joint<f64>, &crate::files::JointLimits)| {
+        let joint = |(joint, limits): (ballbar::Joint<f64>, &ballbar_calib::model::JointLimits)| {
             let (kind, unit) = match joint.kind {
                 JointKind::Revolute => ("revolute", "rad"),
                 JointKind::Prismatic => ("prismatic", "m"),

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use ballbar::{JointKind, Pose, Vector3};
+use ballbar_calib::kinematics::{Convention, DhRow, DhTable, from_link, link_angles};
+use ballbar_calib::model::Robot;
 
 use super::{Exported, origin};
-use crate::files::Robot;
-use crate::kinematics::{Convention, DhRow, DhTable, from_link, link_angles};
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m, without_noise};
 
 /// The table, how far it is from the robot, and where and why its values run away.

@@ -8,8 +8,9 @@ mod urdf;
 use miette::Diagnostic;
 use thiserror::Error;
 
-use crate::files::{FileKind, Robot};
-use crate::kinematics::{Convention, NearlyParallel};
+use crate::files::FileKind;
+use ballbar_calib::kinematics::{Convention, NearlyParallel};
+use ballbar_calib::model::Robot;
 
 /// What to write a robot as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

@@ -7,10 +7,11 @@
 use std::fmt::Write;
 
 use ballbar::{Joint, JointKind, Link, Vector3};
+use ballbar_calib::kinematics::{compose, from_link, link_angles};
+use ballbar_calib::model::{JointLimits, Robot};
 
 use super::{JointZero, origin};
-use crate::files::{ENCODER_ELEMENT, JointLimits, MOST_NAME_BYTES, Robot};
-use crate::kinematics::{compose, from_link, link_angles};
+use crate::files::{ENCODER_ELEMENT, MOST_NAME_BYTES};
 
 /// The robot as a URDF.
 pub(super) fn text(robot: &Robot, zero: JointZero) -> String {

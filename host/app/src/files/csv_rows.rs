@@ -6,13 +6,12 @@ use std::num::ParseFloatError;
 use std::ops::Range;
 
 use ballbar::{JointKind, JointVector};
+use ballbar_calib::model::{NamedPoint, PairingId, Rig, Robot};
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use super::numbers::Range as Of;
 use super::poses::joint_column;
 use super::problem::{Problem, short};
-use super::rig::{NamedPoint, PairingId, Rig};
-use super::robot::Robot;
 use super::source::{InputError, Source};
 use crate::units::ScreenUnit;
 

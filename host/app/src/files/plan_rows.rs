@@ -1,72 +1,16 @@
 //! `plan.csv`: poses to measure and via points, in the order in which the robot goes through them.
 
-use ballbar::{JointKind, JointVector, Kinematics};
+use ballbar::{JointKind, Kinematics};
+use ballbar_calib::model::{Rig, Robot};
+use ballbar_calib::plan::{BarAt, PlanRow, RowKind};
 use csv::StringRecord;
 
 use super::csv_rows::{CsvRows, Expected};
 use super::numbers::Range as Of;
 use super::poses::{csv_record, joint_column};
 use super::problem::Problem;
-use super::rig::{PairingId, Rig};
-use super::robot::Robot;
 use super::source::{InputError, Source};
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
-
-/// What happens at a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RowKind {
-    /// The robot goes through.
-    Via,
-    /// The robot stands still and the bar is read.
-    Measure,
-}
-
-/// How the bar stands at a row.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BarAt {
-    /// Elevation above the table, radians.
-    pub latitude_rad: f64,
-    /// Azimuth from the base's x towards its y, 0 to 2π radians.
-    pub longitude_rad: f64,
-    /// Length by the nominal robot, metres.
-    pub length_m: f64,
-}
-
-/// What is left at a row.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RowMargins {
-    /// To the nearer end of the bar's travel, less what plausible robots may be off, metres; `None` without the bar.
-    pub travel_m: Option<f64>,
-    /// Between the two nearest solids, metres.
-    pub clearance_m: f64,
-    /// Which these are.
-    pub nearest: String,
-    /// Of the revolute joint nearest to a limit, radians; infinite without one.
-    pub limit_rad: f64,
-    /// Of the prismatic joint nearest to a limit, metres; infinite without one.
-    pub limit_m: f64,
-    /// Smallest singular value of the tool's Jacobian, lengths divided by the arm's.
-    pub singularity: f64,
-}
-
-/// One row of a plan. The robot comes to it from the row before by joint interpolation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlanRow {
-    /// Go through or measure.
-    pub kind: RowKind,
-    /// Which chuck and sphere the bar joins, or will join.
-    pub pairing: PairingId,
-    /// Length of the bar at mid travel, metres.
-    pub bar_m: f64,
-    /// Encoder outputs, radians or metres.
-    pub q: JointVector<f64>,
-    /// `None` while the bar is off.
-    pub bar: Option<BarAt>,
-    /// `None` in a plan that was read, since the file's are for people.
-    pub margins: Option<RowMargins>,
-    /// Line in the file that it was read from, from 1; 0 in a new plan.
-    pub line: usize,
-}
 
 const MARGINS: [&str; 6] = ["travel_margin_mm", "clearance_mm", "nearest", "limit_margin_deg", "limit_margin_mm", "singularity"];
 

@@ -1,14 +1,13 @@
-//! `robot.toml`: a chain, its limits and encoders, and when and from what it was calibrated.
+//! `robot.toml`: a robot, and when and from what it was calibrated.
 
 use std::fmt;
 use std::ops::Range;
 
-use ballbar::{Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, MAX_JOINTS};
-use miette::Diagnostic;
+use ballbar::{Chain, Coupling, Encoder, JointKind, MAX_JOINTS};
+use ballbar_calib::model::{Calibration, EncoderFacts, JointLimits, Robot};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
-use thiserror::Error;
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 use toml_edit::{DocumentMut, Item, Table, value};
 
@@ -21,107 +20,6 @@ use crate::units::{ScreenUnit, m_from_mm, tidy};
 
 /// A robot's name is not longer: it goes to screens and into the files of others.
 pub const MOST_NAME_BYTES: usize = 200;
-
-/// A robot as its file describes it.
-#[derive(Clone, Debug)]
-pub struct Robot {
-    /// What the file calls it, or else the file's own name.
-    pub name: String,
-    /// Links, joints and their parameters, SI units.
-    pub chain: Chain<f64>,
-    /// Limits of each joint's encoder output, radians or metres.
-    pub limits: Vec<JointLimits>,
-    /// What is known of each joint's encoder.
-    pub encoders: Vec<EncoderFacts>,
-    /// The table that a fit leaves in the file; `None` for a design.
-    pub calibration: Option<Calibration>,
-    source: Source,
-}
-
-/// A robot's file says too little of its encoders for a board to count with them.
-#[derive(Debug, Error, Diagnostic)]
-#[error("{robot}: {reason}, which the board needs to know")]
-#[diagnostic(help("Give every joint `counts_per_rev` (or `counts_per_mm`) and `sign`; see docs/files.md."))]
-pub struct NoEncoders {
-    robot: String,
-    reason: String,
-}
-
-/// Limits of a joint's encoder output q, radians or metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointLimits {
-    /// Lower limit.
-    pub min: f64,
-    /// Upper limit.
-    pub max: f64,
-}
-
-impl JointLimits {
-    /// Whether `q` lies within, limits included.
-    pub fn contain(&self, q: f64) -> bool {
-        (self.min..=self.max).contains(&q)
-    }
-}
-
-/// How a joint's encoder counts.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EncoderFacts {
-    /// Counts per radian or metre, and from index to index; `None` where the file does not say.
-    pub encoder: Option<Encoder<f64>>,
-    /// Joints nearer to the base whose motion turns this one along.
-    pub couplings: Vec<Coupling<f64>>,
-}
-
-/// When, from what and how well a robot was calibrated.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Calibration {
-    /// Time of the fit, RFC 3339.
-    pub when: String,
-    /// The program and its version.
-    pub by: String,
-    /// What the fit was found to be; `None` in files of versions that did not say.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<CalibrationVerdict>,
-    /// What weighs on it, in whole sentences.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub reasons: Vec<String>,
-    /// The robot that the fit began with.
-    pub from_robot: String,
-    /// Files of poses.
-    pub from_poses: Vec<String>,
-    /// Number of poses.
-    pub poses: usize,
-    /// Number of parameters that were free.
-    pub free_parameters: usize,
-    /// RMS residual before the fit, millimetres.
-    pub rms_initial_mm: f64,
-    /// RMS residual after it, millimetres.
-    pub rms_mm: f64,
-    /// RMS residual of poses left out of the fit (cross-validation), millimetres.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_rms_mm: Option<f64>,
-}
-
-/// What the fit behind a robot's file was found to be. What is worse than these is not written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CalibrationVerdict {
-    /// Proven, and nothing stands against it.
-    Calibrated,
-    /// Good, but something weighs on it: see the reasons.
-    Reserved,
-}
-
-impl CalibrationVerdict {
-    /// The word in the file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Calibrated => "calibrated",
-            Self::Reserved => "reserved",
-        }
-    }
-}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -200,115 +98,82 @@ enum KindToml {
     Prismatic,
 }
 
-impl Robot {
-    /// Takes a built-in robot or reads a file.
-    ///
-    /// # Errors
-    /// [`InputError`] naming the line and what is wrong there.
-    pub fn open(argument: &str) -> Result<Self, InputError> {
-        Self::parse(&Source::named_or_read(argument, &ROBOTS, "robot")?)
+/// Takes a built-in robot or reads a file.
+///
+/// # Errors
+/// [`InputError`] naming the line and what is wrong there.
+pub fn open_robot(argument: &str) -> Result<Robot, InputError> {
+    parse_robot(&robot_source(argument)?)
+}
+
+/// The text of a built-in robot or of a file.
+///
+/// # Errors
+/// [`InputError`] when there is neither.
+pub fn robot_source(argument: &str) -> Result<Source, InputError> {
+    Source::named_or_read(argument, &ROBOTS, "robot")
+}
+
+/// Reads a robot from its TOML text.
+///
+/// # Errors
+/// As [`open_robot`].
+pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
+    let file: RobotToml = deserialize(source)?;
+    let joints = file.joints.len();
+    let of_file = |problem| InputError::of_file(source.name(), problem);
+    if !(1..=MAX_JOINTS).contains(&joints) {
+        return Err(of_file(Problem::JointCount { found: joints }));
+    }
+    if file.links.len() != joints + 1 {
+        return Err(of_file(Problem::LinkCount { found: file.links.len(), expected: joints + 1, joints }));
     }
 
-    /// Reads a robot from its TOML text.
-    ///
-    /// # Errors
-    /// As [`Robot::open`].
-    pub fn parse(source: &Source) -> Result<Self, InputError> {
-        let file: RobotToml = deserialize(source)?;
-        let joints = file.joints.len();
-        let of_file = |problem| InputError::of_file(source.name(), problem);
-        if !(1..=MAX_JOINTS).contains(&joints) {
-            return Err(of_file(Problem::JointCount { found: joints }));
-        }
-        if file.links.len() != joints + 1 {
-            return Err(of_file(Problem::LinkCount { found: file.links.len(), expected: joints + 1, joints }));
-        }
-
-        let mut parameters = Vec::new();
-        let mut kinds = Vec::new();
-        let mut limits = Vec::new();
-        let mut encoders = Vec::new();
-        for (i, link) in file.links.iter().enumerate() {
-            parameters.extend(vector(source, "translation_mm", &link.translation_mm)?.map(m_from_mm));
-            parameters.extend(vector(source, "rotation_deg", &link.rotation_deg)?.map(f64::to_radians));
-            if let Some(joint) = file.joints.get(i) {
-                let reader = JointReader { source, number: i + 1, span: joint.span(), joint: joint.as_ref() };
-                let (kind, offset, scale) = reader.model()?;
-                kinds.push(kind);
-                parameters.extend([offset, scale]);
-                limits.push(reader.limits()?);
-                encoders.push(reader.encoder()?);
-            }
-        }
-        let chain = Chain::new(&kinds, &parameters).map_err(|error| of_file(Problem::Toml(error.to_string())))?;
-        let name = match &file.name {
-            Some(name) => robot_name(source, name)?,
-            None => one_line(source.name()).into_owned(),
-        };
-        Ok(Self { name, chain, limits, encoders, calibration: file.calibration, source: source.clone() })
-    }
-
-    /// The map between encoder positions and joint values.
-    ///
-    /// # Errors
-    /// [`NoEncoders`] when the file does not say how every joint counts.
-    pub fn joint_encoders(&self) -> Result<JointEncoders<f64>, NoEncoders> {
-        let missing = self.encoders.iter().position(|facts| facts.encoder.is_none());
-        let because = |reason| NoEncoders { robot: self.source_name().to_owned(), reason };
-        if let Some(i) = missing {
-            let key = match self.chain.joint_kinds()[i] {
-                JointKind::Revolute => "counts_per_rev",
-                JointKind::Prismatic => "counts_per_mm",
-            };
-            return Err(because(format!("joint {} has no `{key}`", i + 1)));
-        }
-        let encoders: Vec<_> = self.encoders.iter().filter_map(|facts| facts.encoder).collect();
-        let couplings: Vec<_> = self.encoders.iter().flat_map(|facts| facts.couplings.iter().copied()).collect();
-        JointEncoders::new(&encoders, &couplings).map_err(|error: EncoderError| because(error.to_string()))
-    }
-
-    /// What the fit behind this robot was found to be; `None` for a design, and for a file that does not say.
-    pub fn verdict(&self) -> Option<CalibrationVerdict> {
-        self.calibration.as_ref().and_then(|calibration| calibration.verdict)
-    }
-
-    /// What this robot's parameters are, in a few words.
-    pub fn standing(&self) -> &'static str {
-        match (&self.calibration, self.verdict()) {
-            (_, Some(CalibrationVerdict::Calibrated)) => "calibrated",
-            (_, Some(CalibrationVerdict::Reserved)) => "calibrated, with reservations",
-            (Some(_), None) => "fitted, but not found to be calibrated",
-            (None, None) => "design, not calibrated",
+    let mut parameters = Vec::new();
+    let mut kinds = Vec::new();
+    let mut limits = Vec::new();
+    let mut encoders = Vec::new();
+    for (i, link) in file.links.iter().enumerate() {
+        parameters.extend(vector(source, "translation_mm", &link.translation_mm)?.map(m_from_mm));
+        parameters.extend(vector(source, "rotation_deg", &link.rotation_deg)?.map(f64::to_radians));
+        if let Some(joint) = file.joints.get(i) {
+            let reader = JointReader { source, number: i + 1, span: joint.span(), joint: joint.as_ref() };
+            let (kind, offset, scale) = reader.model()?;
+            kinds.push(kind);
+            parameters.extend([offset, scale]);
+            limits.push(reader.limits()?);
+            encoders.push(reader.encoder()?);
         }
     }
+    let chain = Chain::new(&kinds, &parameters).map_err(|error| of_file(Problem::Toml(error.to_string())))?;
+    let name = match &file.name {
+        Some(name) => robot_name(source, name)?,
+        None => one_line(source.name()).into_owned(),
+    };
+    Ok(Robot { name, source: source.name().to_owned(), chain, limits, encoders, calibration: file.calibration })
+}
 
-    /// The file or built-in that this robot was read from.
-    pub fn source_name(&self) -> &str {
-        self.source.name()
-    }
-
-    /// The same file, comments and all, with other parameters and a `[calibration]` table.
-    ///
-    /// # Errors
-    /// The reason why the text could not be edited.
-    pub fn calibrated_toml(&self, chain: &Chain<f64>, calibration: &Calibration) -> Result<String, toml_edit::TomlError> {
-        let mut document: DocumentMut = self.source.text().parse()?;
-        for i in 0..=chain.joints() {
-            let Some(link) = chain.link(i) else { continue };
-            let translation = link.translation_m.map(|m| ScreenUnit::Millimetre.from_si(m));
-            let rotation = [link.alpha_rad, link.beta_rad, link.gamma_rad].map(f64::to_degrees);
-            set_numbers(&mut document["links"][i]["translation_mm"], translation.iter().copied());
-            set_numbers(&mut document["links"][i]["rotation_deg"], rotation.into_iter());
-            if let Some(joint) = chain.joint(i) {
-                let unit = ScreenUnit::from(joint.kind);
-                set_number(&mut document["joints"][i][&format!("offset_{}", unit.name())], unit.from_si(joint.offset));
-                set_number(&mut document["joints"][i]["scale"], joint.scale);
-            }
+/// A robot's text, comments and all, with other parameters and a `[calibration]` table.
+///
+/// # Errors
+/// The reason why the text could not be edited.
+pub fn calibrated_toml(source: &Source, chain: &Chain<f64>, calibration: &Calibration) -> Result<String, toml_edit::TomlError> {
+    let mut document: DocumentMut = source.text().parse()?;
+    for i in 0..=chain.joints() {
+        let Some(link) = chain.link(i) else { continue };
+        let translation = link.translation_m.map(|m| ScreenUnit::Millimetre.from_si(m));
+        let rotation = [link.alpha_rad, link.beta_rad, link.gamma_rad].map(f64::to_degrees);
+        set_numbers(&mut document["links"][i]["translation_mm"], translation.iter().copied());
+        set_numbers(&mut document["links"][i]["rotation_deg"], rotation.into_iter());
+        if let Some(joint) = chain.joint(i) {
+            let unit = ScreenUnit::from(joint.kind);
+            set_number(&mut document["joints"][i][&format!("offset_{}", unit.name())], unit.from_si(joint.offset));
+            set_number(&mut document["joints"][i]["scale"], joint.scale);
         }
-        document.insert("calibration", Item::Table(calibration_table(calibration)));
-        let text = document.to_string();
-        Ok(if text.starts_with(CALIBRATED_NOTE) { text } else { format!("{CALIBRATED_NOTE}{text}") })
     }
+    document.insert("calibration", Item::Table(calibration_table(calibration)));
+    let text = document.to_string();
+    Ok(if text.starts_with(CALIBRATED_NOTE) { text } else { format!("{CALIBRATED_NOTE}{text}") })
 }
 
 /// A name that fits a line.

@@ -1,13 +1,13 @@
 //! `targets.csv`: where a tool is to go, as joint vectors of a controller, as poses, or as both.
 
-use ballbar::{JointVector, Pose, Vector3};
+use ballbar::{Pose, Vector3};
+use ballbar_calib::kinematics::{Compensation, Goal, from_link, link_angles};
+use ballbar_calib::model::Robot;
 
 use super::csv_rows::{CsvRows, Expected};
 use super::numbers::Range as Of;
 use super::poses::{csv_record, joint_column};
-use super::robot::Robot;
 use super::source::{InputError, Source};
-use crate::kinematics::{Compensation, from_link, link_angles};
 use crate::units::{ScreenUnit, fixed, m_from_mm, mm_from_m};
 
 /// A row of a file of targets.
@@ -17,15 +17,6 @@ pub struct Target {
     pub goal: Goal,
     /// Line in the file, from 1.
     pub line: usize,
-}
-
-/// How a target is given.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Goal {
-    /// The pose that the controller's model has at these joints, radians or metres.
-    Joints(JointVector<f64>),
-    /// A pose of the tool in the base frame, and joints near which the controller's own solution is, where they are given.
-    Pose(Pose<f64>, Option<JointVector<f64>>),
 }
 
 const POSE: [&str; 6] = ["x_mm", "y_mm", "z_mm", "alpha_deg", "beta_deg", "gamma_deg"];

@@ -1,18 +1,20 @@
 //! The experiment end to end: shells, fit, the other radius, Table I and II, residuals, and what one sphere can tell.
 
 use ballbar::{Measurement, Parameter, ParameterUnit, Vector3};
+use ballbar_calib::identify::{
+    AndersonDarling, Fit, FitError, FitOptions, Hold, Observation, Residual, ResidualSummary, Spectrum, anderson_darling, fit,
+    residuals,
+};
+use ballbar_calib::model::{Dataset, PoseRow, Robot};
+use ballbar_calib::simulate::{ShellError, ShellPose, Shells, ToolError, tool_error};
 use miette::Diagnostic;
 use thiserror::Error;
 
 use super::pairings::{PairingRanks, RankClass};
 use super::stated;
 use super::stewart::{StewartPlatform, amplification};
-use crate::files::{Dataset, InputError, PoseRow, Rig, Robot};
-use crate::identify::{
-    AndersonDarling, Fit, FitError, FitOptions, Hold, Observation, Residual, ResidualSummary, Spectrum, anderson_darling, fit,
-    residuals,
-};
-use crate::simulate::{ShellError, ShellPose, Shells, ToolError, tool_error};
+use crate::files::{InputError, open_rig, open_robot};
+use crate::remedies::Remedied;
 use crate::units::m_from_mm;
 
 /// All that the experiment gives.
@@ -84,11 +86,11 @@ pub enum ExperimentError {
     /// A shell is out of reach.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Shell(#[from] ShellError),
+    Shell(#[from] Remedied<ShellError>),
     /// No fit.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Fit(#[from] FitError),
+    Fit(#[from] Remedied<FitError>),
 }
 
 /// Poses over which tool errors are taken.
@@ -99,9 +101,9 @@ const WORKSPACE_POSES: usize = 5_000;
 /// # Errors
 /// [`ExperimentError`] when a built-in file, a shell or a fit fails.
 pub fn run(seed: u64, mut on_step: impl FnMut(f64)) -> Result<Experiment, ExperimentError> {
-    let design = Robot::open("puma560")?;
-    let truth = Robot::open("puma560-optimised")?;
-    let rig = Rig::open("triangles")?;
+    let design = open_robot("puma560")?;
+    let truth = open_robot("puma560-optimised")?;
+    let rig = open_rig("triangles")?;
     let shells = |radius_mm: f64, sigma_mm: f64, seed: u64| {
         let pairings = rig.all_pairings();
         let shells = Shells {
@@ -114,13 +116,13 @@ pub fn run(seed: u64, mut on_step: impl FnMut(f64)) -> Result<Experiment, Experi
             sigma_m: m_from_mm(sigma_mm),
             seed,
         };
-        shells.simulate(|| ())
+        shells.simulate(|| ()).map_err(Remedied)
     };
     let options = FitOptions { hold: Hold::paper(), ..FitOptions::default() };
 
     let fitted_shells = shells(stated::FITTED_RADIUS_MM, stated::FITTED_RMS_MM, seed)?;
     on_step(0.1);
-    let fit_of = |poses: &[ShellPose]| fit(&design, &dataset(poses), &options);
+    let fit_of = |poses: &[ShellPose]| fit(&design, &dataset(poses), &options).map_err(Remedied);
     let fit = fit_of(&fitted_shells)?;
     let noise_free = fit_of(&shells(stated::FITTED_RADIUS_MM, 0.0, seed)?)?;
     on_step(0.1);

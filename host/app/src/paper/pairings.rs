@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use ballbar::{Chain, Measurement};
+use ballbar_calib::identify::{Observation, Spectrum};
+use ballbar_calib::model::PairingId;
 use nalgebra::DMatrix;
-
-use crate::files::PairingId;
-use crate::identify::{Observation, Spectrum};
 
 /// The Jacobian of each pairing, ready to be combined.
 #[derive(Clone, Debug)]

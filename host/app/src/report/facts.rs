@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use ballbar::{JointKind, Kinematics, Vector3};
+use ballbar_calib::assess::Assessment;
+use ballbar_calib::identify::{Fit, FittedParameter, Outlier, Residual, ResidualSummary, residuals};
+use ballbar_calib::model::{Dataset, PairingId, PoseRow, Rig, Robot};
 use nalgebra::DMatrix;
 
 use super::workspace::Workspace;
-use crate::assess::Assessment;
-use crate::files::{Dataset, PairingId, PoseRow, Rig, Robot};
-use crate::identify::{Fit, FittedParameter, Outlier, Residual, ResidualSummary, residuals};
 
 /// What the facts are computed from.
 #[derive(Clone, Copy, Debug)]
@@ -155,7 +155,7 @@ impl Facts {
         let rows = rows(inputs, &pairings, &before);
         Self {
             robot: robot.name.clone(),
-            robot_file: robot.source_name().to_owned(),
+            robot_file: robot.source.as_str().to_owned(),
             rig_file: inputs.rig_name.to_owned(),
             files: dataset.files.clone(),
             joints: robot.chain.joint_kinds().to_vec(),

@@ -1,13 +1,13 @@
 //! The page: one HTML file that needs nothing else. Whatever comes from files is escaped by the templates.
 
 use ballbar::Vector3;
+use ballbar_calib::assess::{Answer, Assessment, Proof, ProofKind};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::json;
 
 use super::facts::{Facts, RowFact};
 use super::figures::{CHUCKS, Figure, dark_rules, drawn, hex, wires_m};
 use super::tables::{largest, parameters};
-use crate::assess::{Answer, Assessment, Proof, ProofKind};
 use crate::text::visible;
 use crate::units::{fixed, mm_from_m};
 

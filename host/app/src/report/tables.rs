@@ -1,10 +1,10 @@
 //! The page's tables: parameters, and poses to look at.
 
+use ballbar_calib::identify::{FittedParameter, OutlierTest};
 use maud::{Markup, html};
 
 use super::facts::Facts;
 use super::figures::Table;
-use crate::identify::{FittedParameter, OutlierTest};
 use crate::units::{ScreenUnit, fixed, joints_text, mm_from_m};
 
 const LARGEST: usize = 12;

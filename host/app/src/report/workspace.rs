@@ -1,12 +1,11 @@
 //! How far the tool is from where a controller believes it to be, before and after, in two slices of the workspace.
 
 use ballbar::{JointVector, Kinematics, MAX_PARAMETERS, Vector3};
+use ballbar_calib::identify::Fit;
+use ballbar_calib::model::Robot;
 use nalgebra::{DMatrix, Matrix3xX};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-use crate::files::Robot;
-use crate::identify::Fit;
 
 /// Which slice a point lies in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

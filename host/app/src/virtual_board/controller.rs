@@ -5,13 +5,13 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
+use ballbar_calib::model::{JointLimits, PairingId, Rig, Robot};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::driver::{Driver, Order};
 use super::script::AttachedBar;
-use crate::files::{JointLimits, PairingId, Rig, Robot};
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::{SimReply, SimRequest};
 

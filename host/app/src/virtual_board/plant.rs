@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use ballbar::{JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve};
+use ballbar_calib::model::Robot;
 use ballbar_firmware::{ENCODERS, EncoderLatch, LvdtScan};
 use miette::Diagnostic;
 use rand::SeedableRng;
@@ -20,7 +21,7 @@ use super::lvdt::{code_at, lvdt_curve};
 use super::motion::{Held, Moment, Move, Rest, us_from_s};
 use super::play::{Backlash, Lag};
 use super::script::{AttachedBar, Script, Station, move_duration_s};
-use crate::files::{NoEncoders, Robot};
+use crate::board::{NoEncoders, joint_encoders};
 use crate::robot_link::JointSpeed;
 
 /// Noise of the LVDT's oversampled code, standard deviation, codes.
@@ -89,7 +90,7 @@ impl Plant {
         if joints > ENCODERS {
             return Err(PlantError::TooManyJoints { joints });
         }
-        let encoders = truth.joint_encoders()?;
+        let encoders = joint_encoders(truth)?;
         let mut q = JointVector::zero();
         for (q, limits) in q.as_array_mut().iter_mut().zip(&truth.limits) {
             *q = 0_f64.clamp(limits.min, limits.max);
@@ -261,14 +262,15 @@ mod tests {
     use ballbar::{CounterWidth, ExtendedCounter, Pairing, Vector3};
 
     use super::*;
-    use crate::files::Rig;
-    use crate::simulate::Shells;
+    use crate::files::{open_rig, open_robot};
     use crate::virtual_board::counters::COUNTER_WIDTHS;
+
+    use ballbar_calib::simulate::Shells;
 
     const TRAVEL_M: f64 = 0.075;
 
     fn puma() -> Robot {
-        Robot::open("puma560-optimised").unwrap()
+        open_robot("puma560-optimised").unwrap()
     }
 
     fn plant() -> Plant {
@@ -277,7 +279,7 @@ mod tests {
 
     /// Three poses of one pairing on a shell, and one of another pairing.
     fn script(dwell_s: f64, revolute_deg_s: f64) -> Script {
-        let (robot, rig) = (puma(), Rig::open("triangles").unwrap());
+        let (robot, rig) = (puma(), open_rig("triangles").unwrap());
         let pairings = rig.all_pairings();
         let stations = [(0, 3), (4, 1)].map(|(pairing, per_pairing)| {
             let shells = Shells {
@@ -313,7 +315,7 @@ mod tests {
     #[test]
     fn a_robot_at_rest_shows_the_station_and_the_true_length() {
         let (robot, script) = (puma(), script(1.0, 60.0));
-        let (encoders, truth) = (robot.joint_encoders().unwrap(), Kinematics::new(&robot.chain));
+        let (encoders, truth) = (joint_encoders(&robot).unwrap(), Kinematics::new(&robot.chain));
         let mut plant = plant();
         let mut t_us = 0;
         for station in &script.stations {
@@ -359,7 +361,7 @@ mod tests {
     #[test]
     fn index_pulses_come_whole_turns_apart_and_as_often_as_turns_were_passed() {
         let robot = puma();
-        let encoders = robot.joint_encoders().unwrap();
+        let encoders = joint_encoders(&robot).unwrap();
         let states = states(plant(), script(0.2, 60.0));
         for (i, encoder) in encoders.encoders().iter().enumerate() {
             let mut counter = ExtendedCounter::new(COUNTER_WIDTHS[i], 0);
@@ -429,7 +431,7 @@ mod tests {
 
     #[test]
     fn robots_that_no_board_can_count_are_refused() {
-        let error = Plant::new(&Robot::open("ur5e").unwrap(), TRAVEL_M, 0).unwrap_err();
+        let error = Plant::new(&open_robot("ur5e").unwrap(), TRAVEL_M, 0).unwrap_err();
         assert!(matches!(error, PlantError::NoEncoders(_)));
     }
 }

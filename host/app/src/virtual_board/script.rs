@@ -1,9 +1,9 @@
 //! What the simulated robot does: stations at which it stands and measures, and how fast it goes from one to the next.
 
 use ballbar::{JointKind, JointVector, Kinematics, Pairing};
+use ballbar_calib::simulate::{ShellError, Shells};
 
 use crate::robot_link::JointSpeed;
-use crate::simulate::{ShellError, Shells};
 
 /// A pose to stand at.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,13 +8,14 @@ use ballbar::wire::{
     Answer, BoardHello, Command, Event, FrameReader, HostHello, MAX_FRAME, PROTOCOL, Refusal, Request, ResetReason, SlotState,
     StreamSelection, ToBoard, ToHost, WhichSet, decode, encode,
 };
+use ballbar_calib::model::Robot;
+use ballbar_calib::simulate::Shells;
 use serialport::SerialPort;
 
 use super::*;
-use crate::board::parameter_set;
-use crate::files::{Rig, Robot};
+use crate::board::{joint_encoders, parameter_set};
+use crate::files::{open_rig, open_robot};
 use crate::robot_link::JointSpeed;
-use crate::simulate::Shells;
 
 /// Far longer than anything here takes.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -87,7 +88,7 @@ impl Host {
 }
 
 fn truth() -> Robot {
-    Robot::open("puma560-optimised").unwrap()
+    open_robot("puma560-optimised").unwrap()
 }
 
 fn options(pace: Pace) -> VirtualBoardOptions {
@@ -96,12 +97,12 @@ fn options(pace: Pace) -> VirtualBoardOptions {
 
 fn ready(pace: Pace) -> VirtualBoardOptions {
     let options = options(pace);
-    let set = parameter_set(&Robot::open("puma560").unwrap(), options.plant.lvdt()).unwrap();
+    let set = parameter_set(&open_robot("puma560").unwrap(), options.plant.lvdt()).unwrap();
     VirtualBoardOptions { parameters: Some(set), is_homed: true, ..options }
 }
 
 fn script(per_pairing: usize, dwell_s: f64) -> Script {
-    let (planned_with, truth, rig) = (Robot::open("puma560").unwrap(), truth(), Rig::open("triangles").unwrap());
+    let (planned_with, truth, rig) = (open_robot("puma560").unwrap(), truth(), open_rig("triangles").unwrap());
     let pairings = rig.all_pairings();
     let shells = Shells {
         planned_with: &planned_with,
@@ -122,7 +123,7 @@ const SETTLED: StreamSelection = StreamSelection { samples: false, settled: true
 fn every_station_settles_at_its_pose_and_length() {
     let options = ready(Pace::Free);
     let (curve, truth) = (options.plant.lvdt(), truth());
-    let (encoders, kinematics) = (truth.joint_encoders().unwrap(), Kinematics::new(&truth.chain));
+    let (encoders, kinematics) = (joint_encoders(&truth).unwrap(), Kinematics::new(&truth.chain));
     let mut board = VirtualBoard::start(options).unwrap();
     let mut host = Host::open(&board);
     assert_eq!(host.hello().active.unwrap().name, "PUMA 560");

@@ -1,13 +1,13 @@
 //! `host-cal apply --previous`: the parameters that the last commit replaced, which the other place in flash still holds.
 
 use ballbar::wire::{Answer, Command};
+use ballbar_calib::model::JointLimits;
 use miette::Diagnostic;
 use thiserror::Error;
 
 use super::super::outcome::CommandError;
 use super::{ApplyReport, in_use, store};
 use crate::board::{BoardError, BoardLink, RobotOnBoard};
-use crate::files::JointLimits;
 
 #[derive(Debug, Error, Diagnostic)]
 #[error("the parameters before, of `{name}`, cannot be used: {reason}")]

@@ -3,10 +3,10 @@
 use std::time::Instant;
 
 use ballbar::JointKind;
+use ballbar_calib::model::Robot;
 
 use crate::cmd::screen::{Bar, Joint, Picture, Poses};
 use crate::collect::Now;
-use crate::files::Robot;
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// What changes little during a run.
@@ -37,7 +37,7 @@ const KEYS: &[(&str, &str)] =
 
 impl Still {
     pub(super) fn new(head: Vec<String>, robot: &Robot) -> Self {
-        let limits = |(&kind, limits): (&JointKind, &crate::files::JointLimits)| {
+        let limits = |(&kind, limits): (&JointKind, &ballbar_calib::model::JointLimits)| {
             let unit = ScreenUnit::from(kind);
             (kind, [unit.from_si(limits.min), unit.from_si(limits.max)])
         };

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use ballbar_calib::plan::CheckedPlan;
+
 use crate::cmd::outcome::CommandError;
 use crate::cmd::report::{make_folder, write_session_file};
 use crate::collect::{ProgramOptions, ShellPrograms, plan_programs};
-use crate::plan::CheckedPlan;
 use crate::robot_link::program::{Dialect, Program, ProgramError, ProgramFile, write_program};
 use crate::session::PROGRAMS_NAME;
 

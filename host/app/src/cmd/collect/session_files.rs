@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use ballbar_calib::model::{Rig, Robot};
+use ballbar_calib::plan::PlanRow;
 use miette::Diagnostic;
 use thiserror::Error;
 
 use crate::cmd::outcome::CommandError;
 use crate::cmd::report::write_session_file;
-use crate::files::{PlanRow, RIGS, ROBOTS, Rig, Robot, Source, read_plan};
+use crate::files::{RIGS, ROBOTS, Source, parse_rig, parse_robot, read_plan};
 use crate::session::{PLAN_NAME, RIG_NAME, ROBOT_NAME};
 
 /// Plan, robot and rig.
@@ -47,7 +49,7 @@ impl SessionFiles {
         let robot_source = choose(session, "--robot", robot, ROBOT_NAME, &ROBOTS, &mut new)?;
         let rig_source = choose(session, "--rig", rig, RIG_NAME, &RIGS, &mut new)?;
         let plan_source = choose(session, "--plan", plan.as_deref(), PLAN_NAME, &[], &mut new)?;
-        let (robot, rig) = (Robot::parse(&robot_source)?, Rig::parse(&rig_source)?);
+        let (robot, rig) = (parse_robot(&robot_source)?, parse_rig(&rig_source)?);
         let rows = read_plan(&plan_source, &robot, &rig)?;
         Ok(Self { robot, rig, rows, new })
     }

@@ -2,15 +2,17 @@
 
 use ballbar::wire::{Command, Event, StreamSelection};
 use ballbar::{SettledPose, StillnessCriteria};
+use ballbar_calib::model::{PairingId, Rig, Robot};
+use ballbar_calib::simulate::Shells;
 use miette::Diagnostic;
 use thiserror::Error;
 
 use crate::board::{BAUD, BoardLink, NOMINAL_TRAVEL_M, RobotOnBoard, parameter_set};
 use crate::cmd::outcome::CommandError;
 use crate::cmd::report::progress;
-use crate::files::{PairingId, Rig, Robot, pose_header, pose_record};
+use crate::files::{pose_header, pose_record};
+use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
-use crate::simulate::Shells;
 use crate::units::m_from_mm;
 use crate::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
 
@@ -85,7 +87,7 @@ impl<'a> Bench<'a> {
             seed,
         };
         let speed = JointSpeed { revolute_rad_s: SPEED.to_radians(), ..JointSpeed::default() };
-        let script = Script::from_shells(&shells, DWELL_S, speed, || ())?;
+        let script = Script::from_shells(&shells, DWELL_S, speed, || ()).map_err(Remedied)?;
         let stations = script.stations.clone();
         self.link.act(Command::SetRate { rate_hz: RATE_HZ })?;
         self.link.act(Command::SetStillness(CRITERIA))?;

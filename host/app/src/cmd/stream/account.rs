@@ -2,13 +2,13 @@
 
 use ballbar::wire::{Event, Status, Stream};
 use ballbar::{JointVector, SettleDetector, SettledPose, StillnessCriteria};
+use ballbar_calib::model::{BeyondLimits, Robot};
 
 use super::live::{Latest, Model};
 use super::record_error;
 use super::watch::RobotAndFrame;
 use crate::board::{Frame, Refusals, RobotOnBoard, StreamLosses};
 use crate::cmd::outcome::CommandError;
-use crate::files::{BeyondLimits, Robot};
 use crate::session::{Connection, Recorder, SettledFate, SettledRule};
 use crate::units::{mm_from_m, tidy};
 

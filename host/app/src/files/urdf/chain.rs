@@ -3,14 +3,14 @@
 use std::f64::consts::PI;
 
 use ballbar::{JointKind, MAX_JOINTS, Pose, Vector3};
+use ballbar_calib::kinematics::{compose, from_link, link_angles};
 
 use super::super::problem::Problem;
-use super::super::robot::Robot;
+use super::super::robot::parse_robot;
 use super::super::source::{InputError, Source};
 use super::Imported;
 use super::elements::{EncoderModel, Limits, Motion, UrdfRobot};
 use super::tree::Path;
-use crate::kinematics::{compose, from_link, link_angles};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, mm_from_m, without_noise};
 
@@ -51,7 +51,7 @@ pub(super) fn imported(source: &Source, urdf: &UrdfRobot<'_>, path: &Path<'_>) -
         return Err(InputError::of_file(source.name(), Problem::JointCount { found: joints.len() }));
     }
     let toml = toml(urdf.name, path, &links, &joints);
-    let robot = Robot::parse(&Source::new(&format!("{} as a robot file", source.name()), &toml))?;
+    let robot = parse_robot(&Source::new(&format!("{} as a robot file", source.name()), &toml))?;
     Ok(Imported {
         robot,
         toml,

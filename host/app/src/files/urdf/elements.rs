@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use ballbar::{JointKind, Pose, Vector3};
+use ballbar_calib::kinematics::from_link;
 use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::{Document, Node};
 
@@ -11,7 +12,6 @@ use super::super::problem::{self, Problem};
 use super::super::robot::MOST_NAME_BYTES;
 use super::super::source::{InputError, Source};
 use super::ENCODER_ELEMENT;
-use crate::kinematics::from_link;
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// Everything that the chain may need.

@@ -12,8 +12,8 @@ use std::path::Path;
 use roxmltree::{Document, ParsingOptions};
 
 use super::problem::Problem;
-use super::robot::Robot;
 use super::source::{InputError, Source};
+use ballbar_calib::model::Robot;
 
 /// Our own element within a URDF joint, `<ballbar_encoder offset="…" scale="…"/>`: what URDF has no place for. Readers that do not
 /// know it pass over it.

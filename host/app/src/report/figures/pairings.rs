@@ -1,10 +1,11 @@
 //! Residuals by pairing.
 
+use ballbar_calib::identify::{Offset, ResidualSummary};
+
 use super::canvas::{AFTER, Axis, CURVE, HEIGHT, Labels, WIDTH, about_zero, chart, dots, draw, line};
 use super::table::{Table, number};
 use super::thin::{drawn, drawn_words};
 use super::{Figure, FigureError, Frame};
-use crate::identify::{Offset, ResidualSummary};
 use crate::report::facts::Facts;
 use crate::units::{fixed, mm_from_m};
 

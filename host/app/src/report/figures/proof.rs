@@ -1,9 +1,10 @@
 //! Error before and after on lengths that the fit has not seen.
 
+use ballbar_calib::identify::Residual;
+
 use super::canvas::{AFTER, Axis, BEFORE, Failure, HEIGHT, Labels, WIDTH, chart, decades, draw, line, words};
 use super::table::{Table, number};
 use super::{Figure, FigureError, Frame};
-use crate::identify::Residual;
 use crate::report::facts::Facts;
 use crate::units::mm_from_m;
 

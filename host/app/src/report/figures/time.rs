@@ -1,10 +1,11 @@
 //! Residuals in the order of measurement: drift.
 
+use ballbar_calib::identify::ALIKE;
+
 use super::canvas::{AFTER, Axis, CURVE, HEIGHT, Labels, WIDTH, about_zero, chart, dots, draw, line};
 use super::table::{Table, number};
 use super::thin::{drawn, drawn_words};
 use super::{Figure, FigureError, Frame};
-use crate::identify::ALIKE;
 use crate::report::facts::Facts;
 use crate::units::{fixed, mm_from_m};
 

@@ -1,0 +1,155 @@
+//! What the errors of the calibration library are called here, and what to do about them: the only such place.
+
+use std::borrow::Cow;
+use std::error::Error;
+use std::fmt;
+
+use ballbar_calib::identify::FitError;
+use ballbar_calib::kinematics::NothingAllowed;
+use ballbar_calib::plan::{Cause, FixturesOverlap, PlanError};
+use ballbar_calib::simulate::ShellError;
+use ballbar_calib::units::mm_from_m;
+use miette::Diagnostic;
+
+/// An error of the library with the command's words. What has no [`Remedy`] cannot be shown.
+#[derive(Debug)]
+pub struct Remedied<E>(pub E);
+
+/// A row of the table.
+pub trait Remedy: Error + Send + Sync + 'static {
+    /// What it is called, where the command has words for it that the library does not know.
+    fn words(&self) -> Option<String> {
+        None
+    }
+
+    /// What to do about it.
+    fn remedy(&self) -> Cow<'static, str>;
+}
+
+impl<E: Remedy> fmt::Display for Remedied<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.words() {
+            Some(words) => f.write_str(&words),
+            None => fmt::Display::fmt(&self.0, f),
+        }
+    }
+}
+
+impl<E: Remedy> Error for Remedied<E> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.0.source()
+    }
+}
+
+impl<E: Remedy> Diagnostic for Remedied<E> {
+    fn help(&self) -> Option<Box<dyn fmt::Display + '_>> {
+        Some(Box::new(self.0.remedy()))
+    }
+}
+
+impl<E: Remedy> From<E> for Remedied<E> {
+    fn from(error: E) -> Self {
+        Self(error)
+    }
+}
+
+impl Remedy for FitError {
+    fn remedy(&self) -> Cow<'static, str> {
+        match self {
+            Self::NoRedundancy { .. } => "Measure more poses (the paper took some 800), or hold more parameters with --hold.",
+            Self::NoSuchParameter(_) => "A robot of J joints has x1 … gamma1, offset1, scale1 up to gamma(J+1).",
+        }
+        .into()
+    }
+}
+
+impl Remedy for NothingAllowed {
+    fn remedy(&self) -> Cow<'static, str> {
+        "A command has to be within the limits of both: give one of the files the joint's true limits.".into()
+    }
+}
+
+impl Remedy for ShellError {
+    fn remedy(&self) -> Cow<'static, str> {
+        match self {
+            Self::OutOfReach { .. } => {
+                "Move the chucks nearer to the robot, take another bar length with --bar, or ask for fewer poses."
+            }
+        }
+        .into()
+    }
+}
+
+impl Remedy for FixturesOverlap {
+    fn remedy(&self) -> Cow<'static, str> {
+        match self.turned_plate_rad() {
+            Some(away_rad) => turn_the_spheres(away_rad).into(),
+            None => "Check the positions in rig.toml, or give the true sizes in its [solids] table (docs/files.md).".into(),
+        }
+    }
+}
+
+impl Remedy for PlanError {
+    fn words(&self) -> Option<String> {
+        match self {
+            Self::TooFewToChoose { wanted, found } => {
+                Some(format!("--optimal {wanted}: only {found} poses were found to choose from"))
+            }
+            Self::FewerThanParameters { wanted, parameters } => Some(format!(
+                "--optimal {wanted}: these pairings tell {parameters} parameters, expected more poses than parameters"
+            )),
+            Self::Overlap(_) | Self::OutOfReach { .. } => None,
+        }
+    }
+
+    fn remedy(&self) -> Cow<'static, str> {
+        match self {
+            Self::Overlap(overlap) => overlap.remedy(),
+            Self::OutOfReach { cause, .. } => of_cause(cause),
+            Self::TooFewToChoose { .. } => {
+                "Ask for fewer, or give more to choose from with --per-pair, --bar or --pairings.".into()
+            }
+            Self::FewerThanParameters { .. } => "Ask for three times as many poses as parameters, or more.".into(),
+        }
+    }
+}
+
+fn of_cause(cause: &Cause) -> Cow<'static, str> {
+    match cause {
+        Cause::TurnedPlate(away_rad) => turn_the_spheres(*away_rad).into(),
+        Cause::Links { radius_m, last_radius_m } => format!(
+            "Every link counts as capsules of {:.0} mm radius, the last one of {:.0} mm: give the true ones as link_radius_mm and \
+             last_link_radius_mm in the rig's [solids] table, or move the chucks away from the robot's foot.",
+            mm_from_m(*radius_m),
+            mm_from_m(*last_radius_m)
+        )
+        .into(),
+        Cause::Table { below_chucks_m } => format!(
+            "The table counts as an endless plane {:.0} mm below the lowest chuck: give its true height as table_below_chucks_mm in the \
+             rig's [solids] table, and the links' true link_radius_mm, or set the chucks lower or farther out.",
+            mm_from_m(*below_chucks_m)
+        )
+        .into(),
+        Cause::Travel { travel_m, margin_m } => format!(
+            "Of the {:.1} mm of travel to either side {:.1} mm are kept as a margin, and what is left has to hold the lengths of all \
+             plausible robots: ask for less with --travel-margin-mm, or take a bar with more travel.",
+            mm_from_m(*travel_m) / 2.0,
+            mm_from_m(*margin_m)
+        )
+        .into(),
+        Cause::Paths => "Postures were found, but no two that a path joins with the bar attached: ask for smaller margins, above all \
+                         --clearance-mm and --travel-margin-mm, or for more points with --per-pair."
+            .into(),
+        Cause::Reach => "Move the chucks nearer to the robot or away from its foot, take another bar length with --bar, or ask for smaller \
+                         margins."
+            .into(),
+    }
+}
+
+fn turn_the_spheres(away_rad: f64) -> String {
+    format!(
+        "The plate with the spheres faces {:.0}° away from the axis of the last joint, as the tool's frame is turned in the robot's file: \
+         turn the spheres' positions in rig.toml, not those of the chucks.",
+        away_rad.to_degrees()
+    )
+}

@@ -1,0 +1,124 @@
+//! The answer, and its grounds in whole sentences.
+
+use super::evidence::Evidence;
+use super::order::{Order, by_pairing, offset, trend};
+use super::proof::{Proof, decisive, proofs};
+use super::refusals::{Judged, Refusal, RmsLimit, judge};
+use super::reservations::{Grounds, reservations};
+use super::suspicion::{Suspicion, suspect};
+use crate::identify::{AndersonDarling, Offset, Residual, Trend, anderson_darling, residuals};
+
+/// What the result is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// Lengths left out of the fit are predicted better than by the design, and nothing stands against it.
+    Calibrated,
+    /// The robot's file predicts the lengths as well as a fit to them does: its parameters stay as they are.
+    Unchanged,
+    /// Better than the design, but something in the measurements weighs on the numbers.
+    Reserved,
+    /// Not to be used.
+    NotTrusted,
+}
+
+impl Answer {
+    /// For people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Calibrated => "Calibrated",
+            Self::Unchanged => "Nothing to correct",
+            Self::Reserved => "Better than its design, with reservations",
+            Self::NotTrusted => "Not to be trusted as it is",
+        }
+    }
+
+    /// For machines: `calibrated`, `unchanged`, `reserved`, `not_trusted`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Calibrated => "calibrated",
+            Self::Unchanged => "unchanged",
+            Self::Reserved => "reserved",
+            Self::NotTrusted => "not_trusted",
+        }
+    }
+}
+
+/// The answer and all that it rests on.
+#[derive(Clone, Debug)]
+pub struct Assessment {
+    /// What the result is called.
+    pub answer: Answer,
+    /// Why it is not something better, in whole sentences; none for [`Answer::Calibrated`]. For [`Answer::NotTrusted`] the last one
+    /// says what may be wrong with the measurements, as far as that can be seen.
+    pub reasons: Vec<String>,
+    /// What speaks against the fit; none but for [`Answer::NotTrusted`].
+    pub refusals: Vec<Refusal>,
+    /// The mistake that would explain lengths that do not fit.
+    pub suspicion: Option<Suspicion>,
+    /// How large an RMS residual was believed.
+    pub rms_limit: RmsLimit,
+    /// What the fit has not seen: files and poses held out, its own poses left out in turn, then other lengths of fitted postures.
+    pub proofs: Vec<Proof>,
+    /// The order of measurement.
+    pub order: Order,
+    /// Residuals with the fit by pairing, in the order of `Dataset::pairings`.
+    pub by_pairing: Vec<Vec<Residual>>,
+    /// How they change from the first length to the last, apart from what each pairing is off by; `None` where the poses do not tell.
+    pub trend: Option<Trend>,
+    /// The pairing whose mean residual is the farthest from zero; `None` where the fit leaves no scatter to judge by.
+    pub farthest_offset: Option<Offset>,
+    /// Whether the whitened residuals look normal; `None` for too few.
+    pub normality: Option<AndersonDarling>,
+}
+
+impl Assessment {
+    /// Judges a fit.
+    pub fn new(evidence: &Evidence<'_>) -> Self {
+        let Evidence { robot, dataset, fit, .. } = evidence;
+        let order = Order::new(&dataset.rows.iter().map(|row| row.t_s).collect::<Vec<_>>());
+        let placed = by_pairing(evidence, &order);
+        let whitened_m: Vec<f64> = fit.residuals.iter().map(|residual| residual.whitened_m()).collect();
+        let rms_limit = RmsLimit::new(dataset, evidence.max_rms_m);
+        let mut assessment = Self {
+            answer: Answer::NotTrusted,
+            reasons: Vec::new(),
+            refusals: Vec::new(),
+            suspicion: None,
+            rms_limit,
+            proofs: proofs(evidence, residuals(&robot.chain, dataset)),
+            trend: trend(evidence, &placed),
+            farthest_offset: offset(evidence, &placed),
+            by_pairing: placed.into_iter().map(|group| group.into_iter().map(|(_, residual)| residual).collect()).collect(),
+            normality: anderson_darling(&whitened_m),
+            order,
+        };
+        match judge(evidence, rms_limit, &assessment.proofs) {
+            Judged::Refused(refusals) => {
+                assessment.suspicion = suspect(evidence, &refusals);
+                assessment.reasons.extend(refusals.iter().map(Refusal::to_string));
+                assessment.reasons.extend(assessment.suspicion.as_ref().map(Suspicion::to_string));
+                assessment.refusals = refusals;
+            }
+            Judged::NothingToCorrect => {
+                assessment.answer = Answer::Unchanged;
+                assessment.reasons = reservations(evidence, &assessment.grounds());
+            }
+            Judged::Better => {
+                assessment.reasons = reservations(evidence, &assessment.grounds());
+                assessment.answer = if assessment.reasons.is_empty() { Answer::Calibrated } else { Answer::Reserved };
+            }
+        }
+        assessment
+    }
+
+    fn grounds(&self) -> Grounds<'_> {
+        let Self { proofs, trend, farthest_offset, normality, .. } = self;
+        let is_unchanged = self.answer == Answer::Unchanged;
+        Grounds { is_unchanged, proofs, trend: *trend, farthest_offset: *farthest_offset, normality: *normality }
+    }
+
+    /// The proof that says the least good of the fit: the one to go by.
+    pub fn decisive_proof(&self) -> Option<&Proof> {
+        decisive(&self.proofs)
+    }
+}

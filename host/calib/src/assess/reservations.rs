@@ -1,0 +1,140 @@
+//! What weighs on the numbers of a fit that is worth keeping, in whole sentences.
+
+use super::evidence::Evidence;
+use super::plausibility::{far_beyond_limits, large_changes};
+use super::proof::{Proof, decisive};
+use super::refusals::moved;
+use crate::identify::{ALIKE, AndersonDarling, Offset, Trend};
+use crate::units::{fixed, mm_from_m};
+
+/// Lengths left out may be predicted by this factor worse than those fitted before it is said.
+const MUCH_WORSE: f64 = 2.0;
+/// Of normal residuals one set in a thousand looks less normal.
+const SURELY_NOT: f64 = 1e-3;
+/// Noise of a bar is known within this factor.
+const BEYOND_STATED: f64 = 2.0;
+/// Files of poses end at a nanometre: residuals below a micrometre are of simulations without noise, and compare with nothing.
+const ROUNDING_M: f64 = 1e-6;
+
+/// What was found of a fit that is worth keeping.
+pub(super) struct Grounds<'a> {
+    /// The parameters stay as they are.
+    pub(super) is_unchanged: bool,
+    pub(super) proofs: &'a [Proof],
+    pub(super) trend: Option<Trend>,
+    pub(super) farthest_offset: Option<Offset>,
+    pub(super) normality: Option<AndersonDarling>,
+}
+
+/// All of them; none where nothing stands against the numbers.
+pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Vec<String> {
+    let Evidence { robot, rig, dataset, fit, .. } = evidence;
+    let is_unchanged = grounds.is_unchanged;
+    let mut reserves = Vec::new();
+    if is_unchanged {
+        reserves.push(format!(
+            "{} predicts these lengths as well as a fit to them does (RMS {} mm): what a fit would change is noise, and the parameters stay as \
+             they are.",
+            robot.source.as_str(),
+            fixed(mm_from_m(fit.initial.rms_m), 3)
+        ));
+    }
+    if let Some(calibration) = &robot.calibration {
+        let when = &calibration.when;
+        reserves.push(format!(
+            "The robot's file was calibrated already ({when}): \"before\" is that calibration and no design, and if it was fitted to these \
+             poses, neither number proves anything."
+        ));
+    }
+    let (told, able) = (fit.uncertainty.spectrum.rank, fit.identifiability.spectrum.rank);
+    let independent = robot.chain.independent_parameters();
+    if able < independent {
+        reserves.push(format!(
+            "These poses tell {able} of the {independent} parameters that lengths can tell of this robot: where the others matter, \
+             the tool may be as wrong as before."
+        ));
+    } else if told < independent {
+        reserves.push(format!(
+            "Of {independent} parameters that these poses tell, {told} were fitted: the others were held, right or wrong."
+        ));
+    }
+    match fit.outliers.as_slice() {
+        [] => {}
+        [only] => reserves.push(format!("1 length stands out and weighs on all numbers: {}.", dataset.place(only.row))),
+        [worst, ..] => reserves.push(format!(
+            "{} lengths stand out and weigh on all numbers, most of all {}.",
+            fit.outliers.len(),
+            dataset.place(worst.row)
+        )),
+    }
+    if let Some(correlation) = fit.neighbour_correlation.filter(|&correlation| correlation > ALIKE) {
+        reserves.push(format!(
+            "Residuals follow one another in the order of measurement (correlation {correlation:.2}): something drifts, such as the zero \
+             of the bar, or the robot does what the model does not hold; all deviations are too small."
+        ));
+    }
+    if let Some(trend) = grounds.trend.filter(|trend| trend.is_significant()) {
+        reserves.push(format!(
+            "From the first length to the last the residuals change by {} mm, {:.1} standard errors: something drifts.",
+            fixed(mm_from_m(trend.change_m), 3),
+            trend.errors()
+        ));
+    }
+    if let Some(offset) = grounds.farthest_offset.filter(|offset| offset.is_beyond_chance) {
+        reserves.push(format!(
+            "The lengths of {} are off by {} mm on average, more than chance gives: its chuck or sphere is not where the rig's file says, \
+             or something drifted meanwhile.",
+            rig.pairing_name(dataset.pairings()[offset.group]),
+            fixed(mm_from_m(offset.mean_m), 3)
+        ));
+    }
+    if let Some(normality) = grounds.normality.filter(|normality| normality.p_value < SURELY_NOT) {
+        reserves.push(format!(
+            "Residuals do not look like noise (Anderson-Darling, p = {:.1e}): the robot or the bar does something that the model does not \
+             hold.",
+            normality.p_value
+        ));
+    }
+    for proof in grounds.proofs.iter().filter(|proof| !is_unchanged && !proof.speaks_for()) {
+        reserves.push(format!(
+            "On {}, {} postures are too few, or the difference too small, to say that the fit predicts better than the design.",
+            proof.name,
+            proof.posture_count()
+        ));
+    }
+    if let Some(proof) = decisive(grounds.proofs) {
+        let factor = proof.after_summary().rms_m / fit.fitted.rms_m.max(f64::MIN_POSITIVE);
+        if factor > MUCH_WORSE && proof.after_summary().rms_m > ROUNDING_M && !is_unchanged {
+            reserves.push(format!(
+                "Lengths not seen are predicted {factor:.1} times worse than those fitted, on {}: the poses are few or alike for so many \
+                 parameters. Trust the larger number.",
+                proof.name
+            ));
+        }
+    }
+    if let (Some(sigma_m), Some(stated_m)) = (fit.uncertainty.sigma_m, dataset.stated_sigma_m())
+        && sigma_m > BEYOND_STATED * stated_m
+    {
+        reserves.push(format!(
+            "Lengths scatter about the fit by {:.1} times the noise that the poses state: the model, the rig's coordinates or that noise is wrong.",
+            sigma_m / stated_m
+        ));
+    }
+    let far = large_changes(&robot.chain, &fit.solution.chain);
+    if !far.is_empty() && !is_unchanged {
+        reserves.push(format!(
+            "{}: far more than designs are off. Does the robot stand, and is its tool, as its file says?",
+            moved(&far)
+        ));
+    }
+    if let Some(beyond) = far_beyond_limits(robot, dataset) {
+        reserves.push(format!(
+            "{} of {} poses have joints far beyond their limits, the first at {}, joint {}.",
+            beyond.rows,
+            dataset.rows.len(),
+            dataset.place(beyond.first),
+            beyond.joint
+        ));
+    }
+    reserves
+}

@@ -1,0 +1,75 @@
+//! Which parameters a fit leaves alone.
+
+use std::fmt;
+
+use ballbar::{Chain, Parameter};
+
+use super::identifiability::{Finding, Identifiability};
+
+/// Which parameters stay at their design values: a rule, and parameters by name besides.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Hold {
+    /// For all of them.
+    pub rule: HoldRule,
+    /// Besides.
+    pub names: Vec<Parameter>,
+}
+
+/// By which most parameters are held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HoldRule {
+    /// Hold what the data do not identify.
+    #[default]
+    Auto,
+    /// Hold what the paper holds.
+    Paper,
+    /// Hold nothing but the names.
+    None,
+}
+
+impl Hold {
+    /// The paper's rule.
+    pub fn paper() -> Self {
+        Self { rule: HoldRule::Paper, names: Vec::new() }
+    }
+
+    /// No parameter held.
+    pub fn none() -> Self {
+        Self { rule: HoldRule::None, names: Vec::new() }
+    }
+
+    /// Why each parameter is held; `None` for the free ones.
+    pub fn reasons(&self, chain: &Chain<f64>, found: &Identifiability) -> Vec<Option<Held>> {
+        let reason = |(index, finding): (usize, &Finding)| {
+            let parameter = Parameter::from_index(index);
+            match self.rule {
+                _ if self.names.contains(&parameter) => Some(Held::ByName),
+                HoldRule::Auto if *finding != Finding::Identified => Some(Held::Finding(finding.clone())),
+                HoldRule::Paper if chain.is_conventionally_held(parameter) => Some(Held::AsInPaper),
+                HoldRule::Auto | HoldRule::Paper | HoldRule::None => None,
+            }
+        };
+        found.findings.iter().enumerate().map(reason).collect()
+    }
+}
+
+/// Why a parameter stays at its design value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Held {
+    /// Its name was given.
+    ByName,
+    /// The paper holds it.
+    AsInPaper,
+    /// The poses do not identify it.
+    Finding(Finding),
+}
+
+impl fmt::Display for Held {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ByName => f.write_str("by name"),
+            Self::AsInPaper => f.write_str("as in the paper"),
+            Self::Finding(finding) => finding.fmt(f),
+        }
+    }
+}

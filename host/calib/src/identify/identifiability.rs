@@ -1,0 +1,249 @@
+//! Which parameters the poses can tell, and in words why the others not.
+
+use std::fmt;
+
+use ballbar::{Chain, Measurement, Pairing, Parameter, ParameterUnit, Vector3};
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::observation::Observation;
+use super::pivoting::PivotedColumns;
+use super::spectrum::{RANK_THRESHOLD, Spectrum, column_scales, is_zero_column};
+use crate::model::JointLimits;
+use crate::units::ScreenUnit;
+
+/// How far a design value may plausibly be off, SI: 5 mm, 0.5°, 0.5 %. A parameter whose standard deviation from these poses
+/// would exceed this is better left at its design value, which tells more than the poses do.
+pub fn plausible_error(unit: ParameterUnit) -> f64 {
+    match unit {
+        ParameterUnit::Metre => 5e-3,
+        ParameterUnit::Radian => 0.5_f64.to_radians(),
+        ParameterUnit::One => 5e-3,
+    }
+}
+
+/// What the poses say of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Finding {
+    /// It belongs to the independent subset.
+    Identified,
+    /// It is held by name, and the subset was chosen without it.
+    LeftOut,
+    /// Whatever is measured at the tool, the parameters of the subset named here move it in the same way.
+    Redundant {
+        /// Those that mimic it, strongest first.
+        with: Vec<Parameter>,
+    },
+    /// Other measurements could tell it; in these poses the parameters named here change the lengths in the same way.
+    NotExcited {
+        /// Those that mimic it, strongest first.
+        with: Vec<Parameter>,
+    },
+    /// No length of these poses changes with it.
+    NoEffect,
+    /// Independent, but so weakly that noise would drown it.
+    Weak {
+        /// Standard deviation that these poses alone would give it, given the stronger ones; SI.
+        std: f64,
+        /// What the design value is trusted to; SI.
+        plausible: f64,
+        /// The parameter's unit.
+        unit: ParameterUnit,
+    },
+}
+
+impl Finding {
+    /// A word for machines: `identified`, `left_out`, `redundant`, `not_excited`, `no_effect`, `weak`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Identified => "identified",
+            Self::LeftOut => "left_out",
+            Self::Redundant { .. } => "redundant",
+            Self::NotExcited { .. } => "not_excited",
+            Self::NoEffect => "no_effect",
+            Self::Weak { .. } => "weak",
+        }
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Identified => f.write_str("identified"),
+            Self::LeftOut => f.write_str("left out by name"),
+            Self::Redundant { with } => write!(f, "redundant with {}", list(with)),
+            Self::NotExcited { with } => write!(f, "not excited: in these poses it acts like {}", list(with)),
+            Self::NoEffect => f.write_str("not excited: no length of these poses changes with it"),
+            Self::Weak { std, plausible, unit } => {
+                let screen = ScreenUnit::from(*unit);
+                let (std, plausible) = (screen.from_si(*std), screen.from_si(*plausible));
+                let unit = if screen == ScreenUnit::One { String::new() } else { format!(" {}", screen.name()) };
+                write!(
+                    f,
+                    "weakly excited: its deviation would be {}{unit}, the design is trusted to {plausible}{unit}",
+                    significant(std)
+                )
+            }
+        }
+    }
+}
+
+/// Two significant digits, without an exponent.
+fn significant(value: f64) -> String {
+    let digits = (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.digits$}")
+}
+
+fn list(parameters: &[Parameter]) -> String {
+    const SHOWN: usize = 4;
+    let names: Vec<String> = parameters.iter().take(SHOWN).map(Parameter::to_string).collect();
+    match parameters.len().saturating_sub(SHOWN) {
+        0 => names.join(", "),
+        more => format!("{} and {more} more", names.join(", ")),
+    }
+}
+
+/// What a set of poses can tell about a chain.
+#[derive(Clone, Debug)]
+pub struct Identifiability {
+    /// Singular values of all columns.
+    pub spectrum: Spectrum,
+    /// One finding a parameter.
+    pub findings: Vec<Finding>,
+    /// RMS of what no linear change of the independent parameters explains, metres: the noise as the data show it. Zero when
+    /// there are no more rows than independent parameters.
+    pub noise_m: f64,
+}
+
+impl Identifiability {
+    /// Judges all parameters of `chain` by the weighted Jacobian at its present values. The subset is chosen around the
+    /// parameters in `held`, which are not free whatever the poses say.
+    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], held: &[Parameter]) -> Self {
+        let rows = measurements.len();
+        let observation = Observation::new(chain, measurements);
+        let spectrum = Spectrum::new(&observation.jacobian);
+        let independent = independent_columns(chain, &observation.jacobian, spectrum.rank, held);
+        let noise_m = unexplained_rms(&observation, &independent, rows);
+
+        let reference = reference_jacobian(chain, limits);
+        let always_independent = independent_columns(chain, &reference, Spectrum::new(&reference).rank, held);
+
+        let mut findings = vec![Finding::Identified; chain.parameter_count()];
+        for (index, std) in weak_columns(chain, &observation.jacobian, &independent, noise_m) {
+            let unit = chain.unit(Parameter::from_index(index));
+            findings[index] = Finding::Weak { std, plausible: plausible_error(unit), unit };
+        }
+        let largest = observation.jacobian.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
+        for index in (0..chain.parameter_count()).filter(|index| !independent.contains(index)) {
+            findings[index] = if held.contains(&Parameter::from_index(index)) {
+                Finding::LeftOut
+            } else if !always_independent.contains(&index) {
+                Finding::Redundant { with: mimics(&reference, &always_independent, index) }
+            } else if is_zero_column(observation.jacobian.column(index).norm(), largest) {
+                Finding::NoEffect
+            } else {
+                Finding::NotExcited { with: mimics(&observation.jacobian, &independent, index) }
+            };
+        }
+        Self { spectrum, findings, noise_m }
+    }
+
+    /// The parameters that the data identify, ascending.
+    pub fn identified(&self) -> Vec<usize> {
+        (0..self.findings.len()).filter(|&index| self.findings[index] == Finding::Identified).collect()
+    }
+
+    /// The parameters that the data do not identify, with the reason.
+    pub fn not_identified(&self) -> impl Iterator<Item = (Parameter, &Finding)> + '_ {
+        let findings =
+            self.findings.iter().enumerate().filter(|(_, finding)| !matches!(finding, Finding::Identified | Finding::LeftOut));
+        findings.map(|(index, finding)| (Parameter::from_index(index), finding))
+    }
+}
+
+/// A largest independent subset of the columns, ascending: first as many as possible of those that the paper leaves free, then
+/// of those it holds. In each group in the order of what the scaled columns add, the second group after what the first explains.
+fn independent_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, rank: usize, held: &[Parameter]) -> Vec<usize> {
+    let all = (0..chain.parameter_count()).filter(|&index| !held.contains(&Parameter::from_index(index)));
+    let (held, free): (Vec<_>, Vec<_>) = all.partition(|&index| chain.is_conventionally_held(Parameter::from_index(index)));
+    let scales = column_scales(jacobian);
+    let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| jacobian[(row, column)] / scales[column]);
+
+    // Scaled columns have unit norm, so pivots compare with 1.
+    let first = PivotedColumns::new(scaled.select_columns(&free), RANK_THRESHOLD);
+    let rest = scaled.select_columns(&held);
+    let unexplained = &rest - &first.basis * first.basis.tr_mul(&rest);
+    let second = PivotedColumns::new(unexplained, RANK_THRESHOLD);
+
+    let mut chosen: Vec<usize> = first.order.iter().map(|&k| free[k]).chain(second.order.iter().map(|&k| held[k])).collect();
+    chosen.truncate(rank);
+    chosen.sort_unstable();
+    chosen
+}
+
+/// RMS of the residual's part outside the span of the columns, per degree of freedom.
+fn unexplained_rms(observation: &Observation, independent: &[usize], rows: usize) -> f64 {
+    let freedom = rows.saturating_sub(independent.len());
+    if freedom == 0 {
+        return 0.0;
+    }
+    let q = observation.columns(independent).qr().q();
+    let unexplained = &observation.residual_m - &q * (q.transpose() * &observation.residual_m);
+    (unexplained.norm_squared() / freedom as f64).sqrt()
+}
+
+/// Of the independent columns those that noise would drown, with the standard deviation it would leave them.
+///
+/// Columns are scaled by the plausible error, so that a pivot is the size, over all rows, of what a plausible error of the
+/// parameter does to the lengths and the stronger parameters cannot do; `noise / pivot` is then its standard deviation in
+/// units of the plausible error.
+fn weak_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, independent: &[usize], noise_m: f64) -> Vec<(usize, f64)> {
+    let plausible: Vec<f64> =
+        independent.iter().map(|&index| plausible_error(chain.unit(Parameter::from_index(index)))).collect();
+    let mut effects = jacobian.select_columns(independent);
+    for (mut column, plausible) in effects.column_iter_mut().zip(&plausible) {
+        column *= *plausible;
+    }
+    let PivotedColumns { order, pivots, .. } = PivotedColumns::new(effects, 0.0);
+    let drowned = order.into_iter().zip(pivots).filter(|&(_, pivot)| pivot < noise_m);
+    drowned.map(|(column, pivot)| (independent[column], plausible[column] * noise_m / pivot)).collect()
+}
+
+/// Which columns of the subset make up another column, strongest first.
+fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<Parameter> {
+    let columns = jacobian.select_columns(subset);
+    let target = jacobian.column(index).into_owned();
+    let qr = columns.clone().qr();
+    let Some(coefficients) = qr.r().solve_upper_triangular(&(qr.q().transpose() * &target)) else { return Vec::new() };
+    let mut shares: Vec<(usize, f64)> = subset
+        .iter()
+        .zip(columns.column_iter())
+        .zip(coefficients.iter())
+        .map(|((&i, column), c)| (i, c.abs() * column.norm()))
+        .collect();
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // A thousandth part is not what makes a column look like another.
+    let strongest = shares.first().map_or(0.0, |share| share.1);
+    shares.iter().take_while(|share| share.1 > 1e-3 * strongest).map(|share| Parameter::from_index(share.0)).collect()
+}
+
+/// The Jacobian of an experiment that excites whatever can be excited: random poses within the limits, random pairings of
+/// three chucks and three spheres. What is dependent here is dependent in every experiment.
+fn reference_jacobian(chain: &Chain<f64>, limits: &[JointLimits]) -> DMatrix<f64> {
+    const ROWS_PER_PARAMETER: usize = 4;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut point = |reach_m: f64| Vector3::from_fn(|_, _| rng.random_range(-reach_m..reach_m));
+    let chucks: [Vector3<f64>; 3] = std::array::from_fn(|_| point(1.0));
+    let spheres: [Vector3<f64>; 3] = std::array::from_fn(|_| point(0.2));
+    let count = ROWS_PER_PARAMETER * chain.parameter_count();
+    let measurements: Vec<Measurement<f64>> = (0..count)
+        .filter_map(|i| {
+            let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
+            let pairing = Pairing { chuck_base_m: chucks[i % 3], sphere_tool_m: spheres[i / 3 % 3] };
+            let q = chain.joint_vector(&q).ok()?;
+            Some(Measurement { pairing, q, length_m: 0.0, weight: 1.0 })
+        })
+        .collect();
+    Observation::new(chain, &measurements).jacobian
+}

@@ -1,0 +1,53 @@
+//! Residuals as numbers.
+
+/// A residual `f = d_measured − d_computed` and its weight, 1 on average.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// Metres.
+    pub value_m: f64,
+    /// Weight of its square.
+    pub weight: f64,
+}
+
+impl Residual {
+    /// `√w f`: all of these scatter alike, metres.
+    pub fn whitened_m(self) -> f64 {
+        self.weight.sqrt() * self.value_m
+    }
+}
+
+/// Size of a set of residuals, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResidualSummary {
+    /// How many.
+    pub count: usize,
+    /// Root of the mean square.
+    pub rms_m: f64,
+    /// Mean.
+    pub mean_m: f64,
+    /// Largest size.
+    pub max_abs_m: f64,
+}
+
+impl ResidualSummary {
+    /// Summarises residuals; RMS and mean are weighted (all weights alike: the plain ones).
+    pub fn new(residuals: &[Residual]) -> Self {
+        let weight: f64 = residuals.iter().map(|f| f.weight).sum();
+        Self {
+            count: residuals.len(),
+            rms_m: (residuals.iter().map(|f| f.weight * f.value_m * f.value_m).sum::<f64>() / weight).sqrt(),
+            mean_m: residuals.iter().map(|f| f.weight * f.value_m).sum::<f64>() / weight,
+            max_abs_m: residuals.iter().fold(0.0, |largest, f| largest.max(f.value_m.abs())),
+        }
+    }
+}
+
+/// Median; 0 of none.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => values[n / 2],
+        n => (values[n / 2 - 1] + values[n / 2]) / 2.0,
+    }
+}

@@ -1,0 +1,19 @@
+//! Where every link stands, and which joint vectors bring the tool to a place.
+//!
+//! `ballbar`'s kinematics carries single points and wrenches as fast as a fit needs it. Planning asks for more: the origins and axes of
+//! all joints, for solids and for Jacobians with respect to `q`, and the way back from a pose to joint vectors.
+
+mod branches;
+mod compensation;
+mod dh;
+mod frames;
+mod inverse;
+mod opw;
+mod skeleton;
+
+pub use branches::{Branches, InverseKinematics, Thoroughness};
+pub use compensation::{Compensation, Compensator, Goal, NothingAllowed, Unreached};
+pub use dh::{Convention, DhRow, DhTable, NearlyParallel};
+pub use frames::{apart, compose, from_link, inverse, link_angles};
+pub use opw::Opw;
+pub use skeleton::{Axis, Posture, Skeleton};

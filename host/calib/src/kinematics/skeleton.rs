@@ -1,0 +1,155 @@
+//! Origins, axes and ends of all links at one joint vector.
+
+use ballbar::{Chain, Joint, JointKind, JointVector, MAX_JOINTS, Matrix3, Pose, Vector3};
+use nalgebra::Rotation3;
+
+/// A chain made ready for questions about its links.
+#[derive(Clone, Debug)]
+pub struct Skeleton {
+    links: Vec<LinkTransform>,
+    encoders: Vec<Joint<f64>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct LinkTransform {
+    translation_m: Vector3<f64>,
+    rotation: Matrix3<f64>,
+}
+
+/// A joint's axis in the base frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    /// Revolute or prismatic.
+    pub kind: JointKind,
+    /// A point of the axis, metres.
+    pub point_m: Vector3<f64>,
+    /// Unit vector that the joint turns about or slides along.
+    pub direction: Vector3<f64>,
+    /// Joint value per encoder output.
+    pub scale: f64,
+}
+
+impl Axis {
+    /// `∂point/∂q` of a point behind the joint, base frame: metres per radian or metre.
+    pub fn point_column(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
+        match self.kind {
+            JointKind::Revolute => self.direction.cross(&(point_m - self.point_m)) * self.scale,
+            JointKind::Prismatic => self.direction * self.scale,
+        }
+    }
+
+    /// How fast what is behind the joint turns with `q`, base frame: radians per radian, or zero.
+    pub fn turn_column(&self) -> Vector3<f64> {
+        match self.kind {
+            JointKind::Revolute => self.direction * self.scale,
+            JointKind::Prismatic => Vector3::zeros(),
+        }
+    }
+}
+
+/// Where the links stand at one joint vector; base frame, metres. Links are counted from 0 at the base.
+#[derive(Clone, Debug)]
+pub struct Posture {
+    joints: usize,
+    axes: [Axis; MAX_JOINTS],
+    starts_m: [Vector3<f64>; MAX_JOINTS + 1],
+    corners_m: [Vector3<f64>; MAX_JOINTS + 1],
+    ends_m: [Vector3<f64>; MAX_JOINTS + 1],
+    /// Pose of the tool.
+    pub base_from_tool: Pose<f64>,
+}
+
+impl Posture {
+    /// The joints' axes, from the base.
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes[..self.joints]
+    }
+
+    /// Where link `i` starts: on the axis of the joint before it, behind that joint's motion.
+    pub fn start_m(&self, link: usize) -> Vector3<f64> {
+        self.starts_m[link]
+    }
+
+    /// Where link `i` turns away from the axis of the joint before it: its translation's z part from its start.
+    pub fn corner_m(&self, link: usize) -> Vector3<f64> {
+        self.corners_m[link]
+    }
+
+    /// Where link `i` ends: at the origin of the joint behind it, before that joint's motion, or of the tool.
+    pub fn end_m(&self, link: usize) -> Vector3<f64> {
+        self.ends_m[link]
+    }
+
+    /// A point of the tool in the base frame, metres.
+    pub fn point_in_base(&self, point_tool_m: &Vector3<f64>) -> Vector3<f64> {
+        self.base_from_tool.rotation * point_tool_m + self.base_from_tool.translation_m
+    }
+}
+
+impl Skeleton {
+    /// Prepares a chain.
+    pub fn new(chain: &Chain<f64>) -> Self {
+        let link = |link: ballbar::Link<f64>| LinkTransform {
+            translation_m: link.translation_m,
+            rotation: Rotation3::from_euler_angles(link.gamma_rad, link.beta_rad, link.alpha_rad).into_inner(),
+        };
+        Self {
+            links: (0..=chain.joints()).filter_map(|i| chain.link(i)).map(link).collect(),
+            encoders: (0..chain.joints()).filter_map(|i| chain.joint(i)).collect(),
+        }
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.encoders.len()
+    }
+
+    /// The joints' encoder models.
+    pub fn encoders(&self) -> &[Joint<f64>] {
+        &self.encoders
+    }
+
+    /// Translation of link `i` in the frame before it, metres.
+    pub fn translation_m(&self, link: usize) -> Vector3<f64> {
+        self.links[link].translation_m
+    }
+
+    /// Where the links stand at encoder outputs `q`.
+    pub fn at(&self, q: &JointVector<f64>) -> Posture {
+        let nowhere = Axis { kind: JointKind::Revolute, point_m: Vector3::zeros(), direction: Vector3::z(), scale: 0.0 };
+        let mut posture = Posture {
+            joints: self.encoders.len(),
+            axes: [nowhere; MAX_JOINTS],
+            starts_m: [Vector3::zeros(); MAX_JOINTS + 1],
+            corners_m: [Vector3::zeros(); MAX_JOINTS + 1],
+            ends_m: [Vector3::zeros(); MAX_JOINTS + 1],
+            base_from_tool: Pose { rotation: Matrix3::identity(), translation_m: Vector3::zeros() },
+        };
+        let (mut rotation, mut origin_m) = (Matrix3::identity(), Vector3::zeros());
+        for (i, link) in self.links.iter().enumerate() {
+            posture.starts_m[i] = origin_m;
+            posture.corners_m[i] = origin_m + rotation.column(2) * link.translation_m.z;
+            origin_m += rotation * link.translation_m;
+            posture.ends_m[i] = origin_m;
+            rotation *= link.rotation;
+            let Some(encoder) = self.encoders.get(i) else { continue };
+            let direction: Vector3<f64> = rotation.column(2).into();
+            posture.axes[i] = Axis { kind: encoder.kind, point_m: origin_m, direction, scale: encoder.scale };
+            let theta = encoder.offset + encoder.scale * q.as_array()[i];
+            match encoder.kind {
+                JointKind::Revolute => turn_about_z(&mut rotation, theta),
+                JointKind::Prismatic => origin_m += direction * theta,
+            }
+        }
+        posture.base_from_tool = Pose { rotation, translation_m: origin_m };
+        posture
+    }
+}
+
+/// `rotation · Rz(angle)`.
+fn turn_about_z(rotation: &mut Matrix3<f64>, angle_rad: f64) {
+    let (sin, cos) = angle_rad.sin_cos();
+    let (x, y): (Vector3<f64>, Vector3<f64>) = (rotation.column(0).into(), rotation.column(1).into());
+    rotation.set_column(0, &(x * cos + y * sin));
+    rotation.set_column(1, &(y * cos - x * sin));
+}

@@ -1,0 +1,200 @@
+//! Measured lengths, and where the robot stood.
+
+use std::collections::HashSet;
+use std::fmt;
+
+use ballbar::Measurement;
+use thiserror::Error;
+
+use super::rig::{PairingId, Rig};
+use super::robot::Robot;
+
+/// One measured length, and where the robot stood.
+#[derive(Clone, Debug)]
+pub struct PoseRow {
+    /// Which chuck and sphere the bar joined.
+    pub pairing: PairingId,
+    /// What was measured, SI units; the weight has mean 1 over the dataset.
+    pub measurement: Measurement<f64>,
+    /// Standard deviation of the length, metres, where it is known.
+    pub sigma_m: Option<f64>,
+    /// The part of the measurements that the row belongs to, where they have parts.
+    pub set: Option<String>,
+    /// Time of the measurement, seconds, where it is known.
+    pub t_s: Option<f64>,
+    /// Length of the bar at mid travel, metres, where it is known.
+    pub bar_m: Option<f64>,
+    /// Of an arm that moved, where it is known.
+    pub motion: Option<Motion>,
+    /// Index into [`Dataset::files`].
+    pub file: usize,
+    /// Line in that file, from 1.
+    pub line: usize,
+    /// Number over all files, from 1, whatever is kept apart of them later.
+    pub number: usize,
+}
+
+/// How the length changed while it was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// How fast it grew, metres per second.
+    pub rate_m_s: f64,
+    /// By how much the LVDT's signal was late, as far as it was removed from the length already, seconds.
+    pub removed_lag_s: f64,
+}
+
+/// Measured poses of one robot with one rig, in the order of their files. Rows are numbered from 1.
+#[derive(Clone, Debug, Default)]
+pub struct Dataset {
+    /// The rows.
+    pub rows: Vec<PoseRow>,
+    /// Names of the files.
+    pub files: Vec<String>,
+}
+
+/// Something about a row that may be a mistake but is no reason to refuse it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RowWarning {
+    /// A joint stood beyond its limits.
+    BeyondLimits {
+        /// Number of the joint, from 1.
+        joint: usize,
+    },
+    /// No extension of the bar has this length within its travel.
+    BeyondTravel,
+    /// The same row, measured values and all, stands there before.
+    Repeated,
+}
+
+impl fmt::Display for RowWarning {
+    /// What is said of several such rows: `poses that …`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::BeyondLimits { joint } => write!(f, "have joint {joint} beyond its limits"),
+            Self::BeyondTravel => f.write_str("have a length beyond the bar's travel"),
+            Self::Repeated => f.write_str("repeat an earlier row (and weigh twice)"),
+        }
+    }
+}
+
+/// Some rows have a deviation of their own and others have none, so that they cannot be weighed against one another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("some lengths have a standard deviation, and others have none")]
+pub struct MixedSigma;
+
+impl Dataset {
+    /// Of measurements without a file of their own.
+    ///
+    /// # Errors
+    /// [`MixedSigma`] when only some rows have a deviation.
+    pub fn new(name: &str, rows: Vec<PoseRow>) -> Result<Self, MixedSigma> {
+        let mut dataset = Self::default();
+        dataset.append(name, rows)?;
+        Ok(dataset)
+    }
+
+    /// Appends rows from one place, numbers them, and weighs all rows anew.
+    ///
+    /// # Errors
+    /// [`MixedSigma`]; the dataset is then as it was.
+    pub fn append(&mut self, name: &str, rows: Vec<PoseRow>) -> Result<(), MixedSigma> {
+        let has_sigma = |row: &PoseRow| row.sigma_m.is_some();
+        let first = self.rows.first().or(rows.first()).map(has_sigma);
+        if rows.iter().any(|row| Some(has_sigma(row)) != first) {
+            return Err(MixedSigma);
+        }
+        let (file, before) = (self.files.len(), self.rows.len());
+        self.files.push(name.to_owned());
+        self.rows.extend(rows);
+        for (number, row) in (before + 1..).zip(&mut self.rows[before..]) {
+            (row.file, row.number) = (file, number);
+        }
+        self.weigh();
+        Ok(())
+    }
+
+    /// The rows for which `is_apart` holds, and the others; each weighed by itself.
+    #[must_use]
+    pub fn split(self, is_apart: impl Fn(&PoseRow) -> bool) -> (Self, Self) {
+        let (apart, others) = self.rows.into_iter().partition(is_apart);
+        let part = |rows| {
+            let mut part = Self { rows, files: self.files.clone() };
+            part.weigh();
+            part
+        };
+        (part(apart), part(others))
+    }
+
+    /// Weights `1/σ²`, scaled to mean 1 so that weighted residuals stay lengths.
+    fn weigh(&mut self) {
+        let inverse_variance = |row: &PoseRow| row.sigma_m.map_or(1.0, |sigma| 1.0 / (sigma * sigma));
+        let mean = self.rows.iter().map(inverse_variance).sum::<f64>() / self.rows.len() as f64;
+        for row in &mut self.rows {
+            row.measurement.weight = inverse_variance(row) / mean;
+        }
+    }
+    /// The measurements alone.
+    pub fn measurements(&self) -> Vec<Measurement<f64>> {
+        self.rows.iter().map(|row| row.measurement).collect()
+    }
+
+    /// The same poses with lengths from which a lag of the LVDT was removed, instead of what was removed before.
+    #[must_use]
+    pub fn with_lag_removed(&self, lag_s: f64) -> Self {
+        let mut corrected = self.clone();
+        for row in &mut corrected.rows {
+            if let Some(motion) = &mut row.motion {
+                row.measurement.length_m += (lag_s - motion.removed_lag_s) * motion.rate_m_s;
+                motion.removed_lag_s = lag_s;
+            }
+        }
+        corrected
+    }
+
+    /// What the rows' deviations say that `√w f` scatter by, the residuals times the root of their weight, metres: the same for all rows. `None`
+    /// where it is not given.
+    pub fn stated_sigma_m(&self) -> Option<f64> {
+        let row = self.rows.first()?;
+        row.sigma_m.map(|sigma_m| sigma_m * row.measurement.weight.sqrt())
+    }
+
+    /// The pairings that occur, in the rig's order.
+    pub fn pairings(&self) -> Vec<PairingId> {
+        let mut pairings: Vec<_> = self.rows.iter().map(|row| row.pairing).collect();
+        pairings.sort_unstable();
+        pairings.dedup();
+        pairings
+    }
+
+    /// Indices of the rows of a pairing, in the order of measurement.
+    pub fn rows_of(&self, pairing: PairingId) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows.len()).filter(move |&row| self.rows[row].pairing == pairing)
+    }
+
+    /// `poses.csv:12`, for row index `row`.
+    pub fn place(&self, row: usize) -> String {
+        format!("{}:{}", self.files[self.rows[row].file], self.rows[row].line)
+    }
+
+    /// Rows that may be mistakes: beyond joint limits, beyond the bar's travel, or repeated. Row indices from 0.
+    pub fn warnings(&self, robot: &Robot, rig: &Rig) -> Vec<(usize, RowWarning)> {
+        let mut warnings = Vec::new();
+        let mut seen = HashSet::new();
+        for (i, row) in self.rows.iter().enumerate() {
+            let q = row.measurement.q.as_array();
+            for (joint, (limits, &q)) in robot.limits.iter().zip(q).enumerate() {
+                if !limits.contain(q) {
+                    warnings.push((i, RowWarning::BeyondLimits { joint: joint + 1 }));
+                }
+            }
+            if rig.bar.as_ref().is_some_and(|bar| !bar.reaches(row.measurement.length_m)) {
+                warnings.push((i, RowWarning::BeyondTravel));
+            }
+            let bits: Vec<u64> = q.iter().chain([&row.measurement.length_m]).map(|value| value.to_bits()).collect();
+            if !seen.insert((row.pairing, bits)) {
+                warnings.push((i, RowWarning::Repeated));
+            }
+        }
+        warnings
+    }
+}

@@ -1,0 +1,54 @@
+//! Limits of joints, and joints beyond them.
+
+use std::fmt;
+
+use ballbar::JointKind;
+
+use super::robot::Robot;
+use crate::units::{ScreenUnit, tidy};
+
+/// Limits of a joint's encoder output q, radians or metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLimits {
+    /// Lower limit.
+    pub min: f64,
+    /// Upper limit.
+    pub max: f64,
+}
+
+impl JointLimits {
+    /// Whether `q` lies within, limits included.
+    pub fn contain(&self, q: f64) -> bool {
+        (self.min..=self.max).contains(&q)
+    }
+}
+
+/// A joint that stands beyond its limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BeyondLimits {
+    /// Number of the joint, from 1.
+    pub joint: usize,
+    /// Its kind.
+    pub kind: JointKind,
+    /// Encoder output, radians or metres.
+    pub q: f64,
+    /// Its limits.
+    pub limits: JointLimits,
+}
+
+impl Robot {
+    /// Joints of an encoder vector (radians or metres) that stand beyond their limits.
+    pub fn beyond_limits<'a>(&'a self, q: &'a [f64]) -> impl Iterator<Item = BeyondLimits> + 'a {
+        let joints = self.limits.iter().zip(self.chain.joint_kinds()).zip(q).enumerate();
+        let beyond = joints.filter(|(_, ((limits, _), q))| !limits.contain(**q));
+        beyond.map(|(i, ((&limits, &kind), &q))| BeyondLimits { joint: i + 1, kind, q, limits })
+    }
+}
+
+impl fmt::Display for BeyondLimits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = ScreenUnit::from(self.kind);
+        let [q, min, max] = [self.q, self.limits.min, self.limits.max].map(|value| tidy(unit.from_si(value)));
+        write!(f, "joint {} at {q} {} is beyond its limits, {min} to {max}", self.joint, unit.name())
+    }
+}
