@@ -15,6 +15,7 @@
 //! | [`remedies`] | what to do about the errors of the calibration library |
 //! | [`deadline`] | how long a whole answer may take |
 //! | `platform` | what differs between operating systems |
+//! | [`terminal`] | what is printed, said, shown and typed |
 //! | [`text`] | what comes from outside, as a terminal may show it |
 //! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
 //!
@@ -35,6 +36,7 @@ pub mod report;
 pub mod robot_link;
 #[expect(clippy::disallowed_methods, reason = "a session appends to its log, and reads its own files before it replaces them")]
 pub mod session;
+pub mod terminal;
 pub mod text;
 pub mod units;
 #[cfg(unix)]

@@ -3,7 +3,8 @@
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use host_cal::cmd::{Cli, show_error};
+use host_cal::cmd::Cli;
+use host_cal::terminal::show_error;
 use miette::{GraphicalTheme, MietteHandlerOpts};
 
 #[expect(clippy::disallowed_methods, reason = "stderr is only asked whether it is a terminal")]

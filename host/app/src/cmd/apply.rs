@@ -13,12 +13,13 @@ use thiserror::Error;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
-use super::report::{Report, print, progress, warn};
+use super::report::{Report, print, warn};
 use crate::board::{
     BoardError, BoardLink, KinematicsDifference, NOMINAL_TRAVEL_M, RobotOnBoard, nominal_lvdt, parameter_set,
     rounding_of_kinematics, verify_kinematics,
 };
 use crate::files::open_robot;
+use crate::terminal::progress;
 use crate::text::one_line;
 
 /// Upload a calibrated robot to the board, and verify the board's kinematics against this program's

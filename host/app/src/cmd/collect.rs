@@ -24,7 +24,7 @@ use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
-use super::port::{EndRequest, PortArgs, StillnessArgs};
+use super::port::{PortArgs, StillnessArgs};
 use super::report::print;
 use super::stream::{lock_error, record_error, say_recovered};
 use crate::board::{BoardLink, RobotOnBoard};
@@ -36,6 +36,7 @@ use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run, SessionLock};
+use crate::terminal::EndRequest;
 use crate::units::m_from_mm;
 
 /// Walk a plan: move the robot from pose to pose, wait until it stands, and keep what the bar measures

@@ -13,9 +13,9 @@ use thiserror::Error;
 use super::inputs::{ForceArgs, ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
-use super::table::{Columns, fixed};
 use crate::files::{FileKind, Output, Source, Target, compensated_csv, open_robot, pose_as_written, read_targets};
 use crate::remedies::Remedied;
+use crate::terminal::table::{Columns, fixed};
 use crate::text::shown_path;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 

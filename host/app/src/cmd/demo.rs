@@ -18,10 +18,10 @@ use super::apply::upload;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated, write_file, write_files};
-use super::table::Columns;
 use crate::board::{StreamLosses, rms_kinematics};
 use crate::files::{FileKind, Output, RIGS, Source, append_poses, open_rig, open_robot, robot_source};
 use crate::remedies::Remedied;
+use crate::terminal::table::Columns;
 use crate::text::{one_line, shown_path};
 use crate::units::mm_from_m;
 

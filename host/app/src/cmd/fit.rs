@@ -15,8 +15,8 @@ use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms
 use super::lines::{NotIdentified, PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated};
-use super::table::{Columns, fixed};
 use crate::remedies::Remedied;
+use crate::terminal::table::{Columns, fixed};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
 

@@ -4,7 +4,7 @@ use ballbar_calib::identify::{Finding, Identifiability, PairingResiduals, Residu
 use ballbar_calib::model::{Dataset, Rig};
 use serde::Serialize;
 
-use super::table::{Columns, fixed};
+use crate::terminal::table::{Columns, fixed};
 use crate::units::mm_from_m;
 
 /// Residuals of one pairing, for tables and JSON.

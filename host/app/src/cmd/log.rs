@@ -7,8 +7,7 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::inputs::{ForceArgs, OutputArgs};
-use super::outcome::{CommandError, INTERRUPTED, Outcome};
-use super::port::EndRequest;
+use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn};
 use super::stream::{lock_error, record_error};
 use crate::board::StreamLosses;
@@ -16,6 +15,7 @@ use crate::session::{
     DESCRIPTION_NAME, LOG_NAME, LogExportError, LogFormat, LogReader, LogSummary, LoggedPose, LoggedPoses, SessionLock,
     export_log, missing_poses, recover,
 };
+use crate::terminal::{EndRequest, INTERRUPTED};
 use crate::text::{one_line, shown_path};
 use crate::units::{mm_from_m, tidy};
 

@@ -12,14 +12,14 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
-use super::out::{ask, tell};
-use super::outcome::{CommandError, INTERRUPTED, Outcome};
-use super::port::{EndRequest, PortArgs};
+use super::outcome::{CommandError, Outcome};
+use super::port::PortArgs;
 use super::report::{Report, print, warn};
-use super::table::{Columns, fixed};
-use super::typed::typed_lines;
 use crate::board::{BoardError, BoardLink, LvdtPoint, Refusals, RobotOnBoard, StreamLosses, check_lvdt_points, fit_lvdt};
 use crate::deadline::StopFlag;
+use crate::terminal::out::{ask, tell};
+use crate::terminal::table::{Columns, fixed};
+use crate::terminal::{EndRequest, INTERRUPTED, typed_lines};
 use crate::units::{m_from_mm, mm_from_m};
 
 /// Measure the LVDT's curve from known lengths, and store it on the board

@@ -21,7 +21,6 @@ mod lines;
 mod log;
 mod lvdt;
 mod manual;
-mod out;
 mod outcome;
 mod paper;
 mod plan;
@@ -33,12 +32,9 @@ mod pose;
 mod rank;
 mod report;
 mod report_page;
-mod screen;
 mod simulate;
 mod status;
 mod stream;
-mod table;
-mod typed;
 #[cfg(not(unix))]
 mod unix_only;
 mod validate;
@@ -50,7 +46,6 @@ use std::ffi::OsString;
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::text::one_line;
-pub use out::show_error;
 pub use outcome::{CommandError, Outcome};
 #[cfg(not(unix))]
 use unix_only::{demo, virtual_board};

@@ -6,9 +6,6 @@ use miette::{Diagnostic, Report};
 
 use crate::files::WriteError;
 
-/// Exit code of a command that Ctrl-C or a signal ended before it had done anything: what shells expect.
-pub(super) const INTERRUPTED: u8 = 130;
-
 /// How a command that ran to its end ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {

@@ -6,10 +6,11 @@ use serde::Serialize;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, progress};
-use super::table::{Columns, fixed};
+use super::report::{Report, print};
 use crate::files::open_robot;
 use crate::paper::{Experiment, RankClass, Recovered, run, stated};
+use crate::terminal::progress;
+use crate::terminal::table::{Columns, fixed};
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// Reproduce the paper's experiment, its tables and its numbers

@@ -12,9 +12,10 @@ use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
 use super::plan_margins::{CheckReport, Least};
 use super::plan_report::PlanReport;
-use super::report::{print, progress, warn, write_file};
+use super::report::{print, warn, write_file};
 use crate::files::{FileKind, Output, Source, open_rig, open_robot, read_plan, write_plan};
 use crate::remedies::Remedied;
+use crate::terminal::progress;
 use crate::units::{m_from_mm, mm_from_m};
 
 /// Plan poses on hemispherical shells, and collision-free ways between them

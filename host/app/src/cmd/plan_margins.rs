@@ -6,7 +6,7 @@ use ballbar_calib::plan::{CheckFound, Margins, PlanRow, RowKind};
 use serde::Serialize;
 
 use super::report::Report;
-use super::table::{Columns, fixed};
+use crate::terminal::table::{Columns, fixed};
 use crate::units::{mm_from_m, tidy};
 
 /// What has to be left.

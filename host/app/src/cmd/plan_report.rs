@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::plan_margins::{Least, MarginLine};
 use super::report::Report;
-use super::table::{Columns, fixed};
+use crate::terminal::table::{Columns, fixed};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, mm_from_m, tidy};
 

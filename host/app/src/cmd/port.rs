@@ -1,18 +1,13 @@
 //! Arguments and habits that the commands with a board have in common.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use ballbar::{JointKind, StillnessCriteria};
 use ballbar_calib::model::Robot;
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
 
-use super::outcome::{CommandError, INTERRUPTED};
-use super::screen::give_back;
+use super::outcome::CommandError;
 use crate::board::{BAUD, BoardLink};
-use crate::deadline::StopFlag;
 
 /// Which board.
 #[derive(Args)]
@@ -68,48 +63,5 @@ impl StillnessArgs {
     pub(super) fn criteria(&self) -> StillnessCriteria {
         let hold_us = self.hold_ms.saturating_mul(1_000);
         StillnessCriteria { hold_us, band_counts: self.band_counts, band_codes: self.band_codes }
-    }
-}
-
-/// Whether the user wants to end: set by Ctrl-C and by the signals that ask a program to end.
-#[derive(Clone, Default)]
-pub(super) struct EndRequest {
-    /// By whatever means.
-    stop: StopFlag,
-    /// By Ctrl-C or a signal.
-    is_insisted: Arc<AtomicBool>,
-}
-
-impl EndRequest {
-    /// From here on Ctrl-C ends the work and not the program.
-    pub(super) fn listen() -> Self {
-        let request = Self::default();
-        let heard = request.clone();
-        // A second handler is refused; the first one then ends the program as it always did.
-        let _ = ctrlc::set_handler(move || heard.insist());
-        request
-    }
-
-    /// The user wants to end.
-    pub(super) fn make(&self) {
-        self.stop.set();
-    }
-
-    /// The user wants to end; asked twice, whatever the work waits for is not worth it.
-    pub(super) fn insist(&self) {
-        self.make();
-        if self.is_insisted.swap(true, Ordering::Relaxed) {
-            give_back();
-            std::process::exit(INTERRUPTED.into());
-        }
-    }
-
-    pub(super) fn is_made(&self) -> bool {
-        self.stop.is_set()
-    }
-
-    /// For whoever waits for a board or a controller.
-    pub(super) fn stop_flag(&self) -> &StopFlag {
-        &self.stop
     }
 }

@@ -9,7 +9,7 @@ use thiserror::Error;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
-use super::table::Columns;
+use crate::terminal::table::Columns;
 
 /// List the serial ports of this machine
 #[derive(Args)]

@@ -8,7 +8,7 @@ use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs, parse_pairing
 use super::lines::NotIdentified;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
-use super::table::Columns;
+use crate::terminal::table::Columns;
 use crate::units::mm_from_m;
 
 /// How many parameters these poses can identify, and which they cannot

@@ -2,17 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::out;
 use crate::files::{Source, calibrated_toml, calibration};
+use crate::terminal::out;
 
-pub(super) use super::out::warn;
 use super::outcome::CommandError;
 use crate::files::{FileKind, Output, PendingFile, commit_all, write_atomically};
+pub(super) use crate::terminal::out::warn;
 use crate::text::visible_json;
 use ballbar_calib::assess::{Assessment, Evidence};
 
@@ -102,14 +101,4 @@ pub(super) fn write_calibrated(
     let text = calibrated_toml(source, chain, &calibration).map_err(broken)?;
     write_file(Output { path, kind: FileKind::Robot, force }, &text)?;
     Ok(true)
-}
-
-/// A progress bar on stderr, drawn only where that is a terminal.
-pub(super) fn progress(steps: u64, what: &'static str) -> ProgressBar {
-    if !out::is_seen() {
-        return ProgressBar::hidden();
-    }
-    let style =
-        ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {eta:>4}").unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(steps).with_style(style).with_message(what)
 }

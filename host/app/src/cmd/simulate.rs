@@ -9,9 +9,10 @@ use serde::Serialize;
 
 use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print, progress, write_file};
+use super::report::{Report, print, write_file};
 use crate::files::{FileKind, Output, open_rig, open_robot, write_poses};
 use crate::remedies::Remedied;
+use crate::terminal::progress;
 use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, mm_from_m};
 

@@ -14,8 +14,8 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
 use super::report::{Report, print};
-use super::table::Columns;
 use crate::board::{BoardError, BoardLink};
+use crate::terminal::table::Columns;
 use crate::text::one_line;
 
 /// How the board is: counters, encoders, parameters, self-test

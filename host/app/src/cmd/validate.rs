@@ -9,7 +9,7 @@ use super::inputs::{Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::lines::{PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
-use super::table::{Columns, fixed};
+use crate::terminal::table::{Columns, fixed};
 use crate::units::mm_from_m;
 
 /// Residuals on poses that the fit has not seen

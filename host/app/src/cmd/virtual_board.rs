@@ -13,14 +13,14 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs, parse_pairings};
-use super::out::tell_lines;
 use super::outcome::{CommandError, Outcome};
-use super::port::EndRequest;
-use super::report::{Report, print, progress};
+use super::report::{Report, print};
 use crate::board::{NOMINAL_TRAVEL_M, parameter_set};
 use crate::files::{open_rig, open_robot};
 use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
+use crate::terminal::out::tell_lines;
+use crate::terminal::{EndRequest, progress};
 use crate::units::m_from_mm;
 use crate::virtual_board::{
     Controller, ControllerOptions, Driven, Driver, Pace, Plant, Script, VirtualBoard, VirtualBoardOptions, driver,

@@ -5,14 +5,13 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use ballbar::JointKind;
 
 use super::picture::{Next, Still, picture};
-use crate::cmd::port::EndRequest;
-use crate::cmd::screen::{Key, Screen};
-use crate::cmd::typed::typed_lines;
 use crate::collect::{Event, Operator, Wish};
 use crate::deadline::StopFlag;
 use crate::robot_link::LinkError;
 use crate::robot_link::sim::{SimHand, SimRequest};
 use crate::session::Connection;
+use crate::terminal::screen::{Key, Screen};
+use crate::terminal::{EndRequest, typed_lines};
 use crate::units::{fixed, joints_text, mm_from_m};
 
 /// What lines do that are typed, for the start of a run.

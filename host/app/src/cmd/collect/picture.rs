@@ -5,8 +5,8 @@ use std::time::Instant;
 use ballbar::JointKind;
 use ballbar_calib::model::Robot;
 
-use crate::cmd::screen::{Bar, Joint, Picture, Poses};
 use crate::collect::Now;
+use crate::terminal::screen::{Bar, Joint, Picture, Poses};
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// What changes little during a run.

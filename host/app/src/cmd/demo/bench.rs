@@ -9,10 +9,10 @@ use thiserror::Error;
 
 use crate::board::{BAUD, BoardLink, NOMINAL_TRAVEL_M, RobotOnBoard, parameter_set};
 use crate::cmd::outcome::CommandError;
-use crate::cmd::report::progress;
 use crate::files::{pose_header, pose_record};
 use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
+use crate::terminal::progress;
 use crate::units::m_from_mm;
 use crate::virtual_board::{Pace, Plant, Script, VirtualBoard, VirtualBoardOptions};
 

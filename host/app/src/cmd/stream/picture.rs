@@ -8,7 +8,7 @@ use super::StreamArgs;
 use super::account::Account;
 use super::live::Latest;
 use crate::board::{BoardLink, RobotOnBoard};
-use crate::cmd::screen::{Bar, Joint, Picture, Poses};
+use crate::terminal::screen::{Bar, Joint, Picture, Poses};
 use crate::units::mm_from_m;
 
 /// The picture of a moment; without a link, of a board that is away.

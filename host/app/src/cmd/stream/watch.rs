@@ -11,9 +11,9 @@ use super::picture::picture;
 use super::{FrameLine, StreamArgs, StreamReport, record_error};
 use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
 use crate::cmd::outcome::CommandError;
-use crate::cmd::port::EndRequest;
-use crate::cmd::screen::{Key, Screen};
 use crate::session::{BoardDescription, Recorder};
+use crate::terminal::EndRequest;
+use crate::terminal::screen::{Key, Screen};
 
 /// One run of `stream`.
 pub(super) struct Watch<'a> {

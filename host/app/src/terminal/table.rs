@@ -3,14 +3,15 @@
 use comfy_table::{CellAlignment, Table, presets};
 
 use crate::text::one_line;
-pub(super) use crate::units::fixed;
+
+pub(crate) use crate::units::fixed;
 
 /// A table under construction.
-pub(super) struct Columns(Table);
+pub(crate) struct Columns(Table);
 
 impl Columns {
     /// Headings; one that begins with `<` is of words, the others are of numbers.
-    pub(super) fn new(headings: &[&str]) -> Self {
+    pub(crate) fn new(headings: &[&str]) -> Self {
         let mut table = Table::new();
         table.load_style(presets::NOTHING).set_header(headings.iter().map(|heading| heading.trim_start_matches('<')));
         for (i, heading) in headings.iter().enumerate() {
@@ -23,12 +24,12 @@ impl Columns {
     }
 
     /// One line.
-    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.0.add_row(cells.into_iter().map(|cell| one_line(&cell).into_owned()));
     }
 
     /// The text, a newline behind each line and no white space before one.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         self.0.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
     }
 }

@@ -6,8 +6,7 @@ use ballbar::{JointKind, Stillness};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
-use super::layout;
-use super::{Bar, Joint, Picture, Poses};
+use super::{Bar, Joint, Picture, Poses, layout};
 
 fn text(picture: &Picture, notes: &[String], (width, height): (u16, u16)) -> String {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 
 /// Lines of stdin; a thread reads them, since no read of a line can be given up. Closed when stdin is.
-pub(super) fn typed_lines() -> Receiver<String> {
+pub(crate) fn typed_lines() -> Receiver<String> {
     let (sender, receiver) = channel();
     let read = move || {
         for line in stdin().lock().lines() {

@@ -2,28 +2,21 @@
 
 use std::collections::VecDeque;
 use std::io::Write;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, Once, TryLockError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 use ratatui::backend::CrosstermBackend;
-use ratatui::crossterm::cursor::Show;
 use ratatui::crossterm::execute;
-use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
+use ratatui::crossterm::terminal::{EnterAlternateScreen, enable_raw_mode};
 
 use super::layout;
 use super::picture::Picture;
-use crate::cmd::out::terminal;
-use crate::cmd::port::EndRequest;
 use crate::platform::{Key, Keyboard};
-
-/// Whether a screen has the terminal. Held while a frame is written, so that nothing is written into the middle of one, and nothing after
-/// the terminal was given back.
-static IS_TAKEN: Mutex<bool> = Mutex::new(false);
-/// A terminal that takes no bytes must not keep the program from ending.
-const PATIENCE: Duration = Duration::from_millis(200);
+use crate::terminal::EndRequest;
+use crate::terminal::given_back::{give_back, give_back_on_panic, lock};
+use crate::terminal::out::terminal;
 
 /// A terminal in raw mode that shows the alternate screen.
 pub(super) struct Terminal {
@@ -80,39 +73,6 @@ impl Drop for Terminal {
         }
         give_back();
     }
-}
-
-/// Gives the terminal back as it was, if a screen has it.
-pub(in crate::cmd) fn give_back() {
-    let began = Instant::now();
-    let mut is_taken = loop {
-        match IS_TAKEN.try_lock() {
-            Ok(is_taken) => break Some(is_taken),
-            Err(TryLockError::Poisoned(poisoned)) => break Some(poisoned.into_inner()),
-            Err(TryLockError::WouldBlock) if began.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(1)),
-            Err(TryLockError::WouldBlock) => break None,
-        }
-    };
-    if is_taken.as_mut().is_none_or(|is_taken| std::mem::take(&mut **is_taken)) {
-        // Whatever fails here cannot be told anywhere.
-        let _ = disable_raw_mode();
-        let _ = execute!(terminal(), LeaveAlternateScreen, Show);
-    }
-}
-
-fn lock() -> MutexGuard<'static, bool> {
-    IS_TAKEN.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-}
-
-fn give_back_on_panic() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let before = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |panic| {
-            give_back();
-            before(panic);
-        }));
-    });
 }
 
 /// Passes keys on until the screen is over, or the terminal gone, which asks the program to end as well.

@@ -10,17 +10,16 @@ mod tests;
 use std::io::{IsTerminal, stdin};
 use std::time::{Duration, Instant};
 
-pub(super) use picture::{Bar, Joint, Picture, Poses};
+pub(crate) use picture::{Bar, Joint, Picture, Poses};
 use terminal::Terminal;
-pub(super) use terminal::give_back;
 
 use super::out::{is_seen, tell};
-use super::port::EndRequest;
-pub(super) use crate::platform::Key;
+pub(crate) use crate::platform::Key;
+use crate::terminal::EndRequest;
 use crate::text::one_line;
 
 /// The steady screen, or lines on stderr.
-pub(super) struct Screen {
+pub(crate) struct Screen {
     terminal: Option<Terminal>,
     /// The latest of what was noted, for the steady screen.
     notes: Vec<String>,
@@ -36,7 +35,7 @@ const LAST_NOTES: usize = 10;
 
 impl Screen {
     /// A steady screen needs a terminal at both ends: one to draw on and one to take keys from.
-    pub(super) fn open(end: &EndRequest) -> Self {
+    pub(crate) fn open(end: &EndRequest) -> Self {
         let is_dumb = std::env::var_os("TERM").is_some_and(|name| name == "dumb");
         let is_terminal = is_seen() && stdin().is_terminal() && !is_dumb;
         // A terminal that cannot be taken still shows lines.
@@ -45,24 +44,24 @@ impl Screen {
     }
 
     /// Whether keys are heard, and a picture seen.
-    pub(super) fn is_steady(&self) -> bool {
+    pub(crate) fn is_steady(&self) -> bool {
         self.terminal.is_some()
     }
 
     /// The next key that was pressed; none without a steady screen.
-    pub(super) fn key(&mut self) -> Option<Key> {
+    pub(crate) fn key(&mut self) -> Option<Key> {
         self.terminal.as_mut()?.key()
     }
 
     /// Forgets every press of a key so far: it was not meant for what is asked now.
-    pub(super) fn forget(&mut self, key: Key) {
+    pub(crate) fn forget(&mut self, key: Key) {
         if let Some(terminal) = &mut self.terminal {
             terminal.forget(key);
         }
     }
 
     /// Draws the picture, when it is time to and there is a steady screen.
-    pub(super) fn draw(&mut self, picture: impl FnOnce() -> Picture) {
+    pub(crate) fn draw(&mut self, picture: impl FnOnce() -> Picture) {
         if let Some(terminal) = &mut self.terminal
             && self.shown.elapsed() >= REDRAW
         {
@@ -72,7 +71,7 @@ impl Screen {
     }
 
     /// Says how things stand, when it is time to and there is no steady screen.
-    pub(super) fn say(&mut self, line: impl FnOnce() -> String) {
+    pub(crate) fn say(&mut self, line: impl FnOnce() -> String) {
         if self.terminal.is_none() && self.shown.elapsed() >= SAY {
             self.shown = Instant::now();
             tell(&line());
@@ -80,7 +79,7 @@ impl Screen {
     }
 
     /// Says something that stays.
-    pub(super) fn note(&mut self, text: &str) {
+    pub(crate) fn note(&mut self, text: &str) {
         if self.terminal.is_none() {
             return text.lines().for_each(tell);
         }
@@ -90,7 +89,7 @@ impl Screen {
     }
 
     /// Gives the terminal back, and says the latest notes again.
-    pub(super) fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         if self.terminal.take().is_some() {
             let first = self.notes.len().saturating_sub(LAST_NOTES);
             self.notes.drain(..).skip(first).for_each(|note| tell(&note));

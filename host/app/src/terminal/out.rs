@@ -11,12 +11,12 @@ use miette::{Diagnostic, LabeledSpan, Report, Severity, SourceCode};
 use crate::text::{one_line, visible};
 
 /// Prints a result for people.
-pub(super) fn print_text(text: &str) -> IoResult<()> {
+pub(crate) fn print_text(text: &str) -> IoResult<()> {
     print_raw(&visible(text))
 }
 
 /// Prints the text of a file for programs: as it is, unless a terminal shows it.
-pub(super) fn print_document(text: &str) -> IoResult<()> {
+pub(crate) fn print_document(text: &str) -> IoResult<()> {
     if stdout().is_terminal() { print_text(text) } else { print_raw(text) }
 }
 
@@ -29,32 +29,32 @@ fn print_raw(text: &str) -> IoResult<()> {
 }
 
 /// Says something on stderr that is no result; one line. Without a stderr nobody is there to be told.
-pub(super) fn tell(line: &str) {
+pub(crate) fn tell(line: &str) {
     let _ = writeln!(stderr(), "{}", one_line(line));
 }
 
 /// Asks something on stderr, and leaves the cursor behind it.
-pub(super) fn ask(words: &str) {
+pub(crate) fn ask(words: &str) {
     let _ = write!(stderr(), "{}", one_line(words));
 }
 
 /// Says something that is no result and no error.
-pub(super) fn warn(message: &str) {
+pub(crate) fn warn(message: &str) {
     tell(&format!("warning: {message}"));
 }
 
 /// Whether stderr is a terminal.
-pub(super) fn is_seen() -> bool {
+pub(crate) fn is_seen() -> bool {
     stderr().is_terminal()
 }
 
 /// Says several lines on stderr.
-pub(super) fn tell_lines(text: &str) {
+pub(crate) fn tell_lines(text: &str) {
     let _ = stderr().write_all(visible(text).as_bytes());
 }
 
 /// The terminal itself, for what it is to obey: frames of a screen, whose texts were made visible before.
-pub(super) fn terminal() -> Stderr {
+pub(crate) fn terminal() -> Stderr {
     stderr()
 }
 
