@@ -6,7 +6,7 @@ use embedded_io::{Read, ReadReady, Write};
 use heapless::String;
 use heapless::spsc::Consumer;
 
-use crate::commands::Conversation;
+use crate::conversation::Conversation;
 use crate::hardware::Hardware;
 use crate::log::info;
 use crate::outbox::Outbox;

@@ -16,6 +16,7 @@
 
 mod board;
 mod commands;
+mod conversation;
 mod crash;
 mod hardware;
 mod log;

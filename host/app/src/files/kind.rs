@@ -94,7 +94,7 @@ pub(super) enum Found {
 }
 
 /// Robots and rigs are read whole, of other kinds the beginning tells.
-const MOST_BYTES: u64 = super::source::MOST_TOML_BYTES;
+const MOST_BYTES: u64 = super::reading::MOST_TOML_BYTES;
 
 /// Looks at the beginning of a file.
 pub(super) fn recognise(file: impl Read) -> IoResult<Found> {

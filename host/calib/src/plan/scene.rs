@@ -6,64 +6,18 @@ use rand_chacha::ChaCha8Rng;
 
 mod bar;
 mod gaps;
+mod things;
 
 use self::bar::BarEnds;
+use self::gaps::{AT_STILL_END_M, End, Pair, candidates};
 pub(super) use self::gaps::{CONSTANT_M, Gap};
-use self::gaps::{End, Pair, candidates};
-use super::bodies::{Body, bodies};
+use self::things::all_things;
+pub(super) use self::things::{Thing, What};
 use super::contact::{Contact, Nearest};
-use super::geometry::{Core, Disc, carrier, outward};
+use super::geometry::{Core, Disc};
 use super::swing::{Reach, Swing};
 use crate::kinematics::{Posture, Skeleton};
 use crate::model::{NamedPoint, PairingId, Rig, Robot, Solids};
-
-/// One solid: all points within `radius_m` of a core.
-#[derive(Clone, Debug)]
-pub(super) struct Thing {
-    pub(super) what: What,
-    /// How many joints move it.
-    pub(super) joints: usize,
-    pub(super) radius_m: f64,
-    reach: Reach,
-}
-
-/// What a thing is, and where.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum What {
-    Table {
-        z_m: f64,
-    },
-    ChuckPlate(Disc),
-    Chuck {
-        index: usize,
-        centre_m: Vector3<f64>,
-    },
-    Link(Body),
-    /// Tool frame.
-    SpherePlate(Disc),
-    /// Tool frame.
-    Sphere {
-        index: usize,
-        centre_m: Vector3<f64>,
-    },
-}
-
-impl What {
-    pub(super) fn place(&self, posture: &Posture) -> Core {
-        match self {
-            Self::Table { z_m } => Core::Below(*z_m),
-            Self::ChuckPlate(disc) => Core::Disc(*disc),
-            Self::Chuck { centre_m, .. } => Core::Point(*centre_m),
-            Self::Link(body) => Core::Segment(body.segment(posture)),
-            Self::SpherePlate(disc) => Core::Disc(Disc {
-                centre_m: posture.point_in_base(&disc.centre_m),
-                normal: posture.base_from_tool.rotation * disc.normal,
-                radius_m: disc.radius_m,
-            }),
-            Self::Sphere { centre_m, .. } => Core::Point(posture.point_in_base(centre_m)),
-        }
-    }
-}
 
 /// Robot and rig as solids.
 #[derive(Clone, Debug)]
@@ -81,8 +35,6 @@ pub struct Scene {
 
 /// Postures by which gaps are judged.
 const POSTURES: usize = 400;
-/// A gap at a still end is no less than at the end itself, but for rounding.
-const AT_STILL_END_M: f64 = 1e-6;
 
 impl Scene {
     /// Sets the scene, and tells what gaps were seen while it was set; `clearance_m` is what has to stay between any two things.
@@ -287,31 +239,4 @@ impl Scene {
             _ => 0.0,
         }
     }
-}
-
-fn all_things(
-    skeleton: &Skeleton,
-    solids: &Solids,
-    chucks_m: &[Vector3<f64>],
-    spheres_tool_m: &[Vector3<f64>],
-    thing: &impl Fn(What, usize, f64) -> Thing,
-) -> Vec<Thing> {
-    let lowest_m = chucks_m.iter().map(|chuck_m| chuck_m.z).fold(f64::INFINITY, f64::min);
-    let chuck_plate =
-        carrier(chucks_m, Vector3::z(), solids.chuck_plate_below_m, solids.chuck_radius_m + solids.chuck_plate_rim_m);
-    let sphere_rim_m = solids.sphere_radius_m + solids.sphere_plate_rim_m;
-    let sphere_plate = carrier(spheres_tool_m, outward(spheres_tool_m), solids.sphere_plate_behind_m, sphere_rim_m);
-    let tool = skeleton.joints();
-    let mut things = vec![
-        thing(What::Table { z_m: lowest_m - solids.table_below_chucks_m }, 0, 0.0),
-        thing(What::ChuckPlate(chuck_plate), 0, 0.0),
-    ];
-    let chuck = |(index, &centre_m): (usize, &Vector3<f64>)| thing(What::Chuck { index, centre_m }, 0, solids.chuck_radius_m);
-    things.extend(chucks_m.iter().enumerate().map(chuck));
-    things.extend(bodies(skeleton, solids).into_iter().map(|body| thing(What::Link(body), body.link, body.radius_m)));
-    things.push(thing(What::SpherePlate(sphere_plate), tool, 0.0));
-    let sphere =
-        |(index, &centre_m): (usize, &Vector3<f64>)| thing(What::Sphere { index, centre_m }, tool, solids.sphere_radius_m);
-    things.extend(spheres_tool_m.iter().enumerate().map(sphere));
-    things
 }

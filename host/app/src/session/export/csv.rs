@@ -2,9 +2,10 @@
 
 use std::io::{Result, Write};
 
+use super::column::ColumnType;
 use super::entry::{Entry, Writer};
 use super::shape::Shape;
-use super::table::{ColumnType, TableName, Value};
+use super::table::{TableName, Value};
 
 /// Writes CSV; what is unknown is empty, flags are 0 and 1.
 pub(super) struct CsvWriter<W> {

@@ -14,9 +14,11 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
 
-use super::entry::{Entry, Stamp, Writer};
+use super::column::{Column, ColumnType};
+use super::entry::{Entry, Writer};
 use super::shape::Shape;
-use super::table::{Column, ColumnType, TableName, Value};
+use super::stamp::Stamp;
+use super::table::{TableName, Value};
 
 /// Bytes of a chunk: what is held in memory.
 const CHUNK_BYTES: u64 = 4 << 20;

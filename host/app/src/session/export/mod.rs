@@ -8,11 +8,13 @@
 //! A log may begin before its board had parameters, and go on with another robot's: only its end tells which columns it needs. So
 //! it is read twice, and never held in memory.
 
+mod column;
 mod csv;
 mod entry;
 mod mcap;
 mod parquet;
 mod shape;
+mod stamp;
 mod table;
 mod teller;
 

@@ -11,9 +11,10 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{ColumnPath, Type};
 
+use super::column::{Column, ColumnType};
 use super::entry::{Entry, Writer};
 use super::shape::Shape;
-use super::table::{Column, ColumnType, TableName, Value};
+use super::table::{TableName, Value};
 
 /// Rows of a row group: what is held in memory, some 20 MB for six joints.
 const GROUP_ROWS: usize = 1 << 17;

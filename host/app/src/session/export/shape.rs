@@ -10,7 +10,7 @@ use super::super::description::{BoardDescription, RobotDescription};
 use super::super::log::{LogReader, Record};
 use super::super::segments::unix_ms_of;
 use super::LogExportError;
-use super::table::Column;
+use super::column::Column;
 
 /// What a whole log needs columns for, and what it was recorded with.
 #[derive(Debug)]

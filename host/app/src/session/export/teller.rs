@@ -5,8 +5,9 @@ use ballbar::wire::{Answer, Event, LogMark, Stream, ToHost};
 use super::super::log::Record;
 use super::super::pose_mark::PoseMark;
 use super::super::segments::{Segments, unix_ms_of};
-use super::entry::{Entry, Stamp};
+use super::entry::Entry;
 use super::shape::Shape;
+use super::stamp::Stamp;
 use super::table::{Setting, TableName, Value};
 use crate::board::{RobotOnBoard, StreamLosses};
 

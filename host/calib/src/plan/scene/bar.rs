@@ -1,7 +1,8 @@
 //! The bar, and what it comes near.
 
-use super::gaps::{End, Gap, Range};
-use super::{Scene, Thing, What};
+use super::Scene;
+use super::gaps::{AT_STILL_END_M, End, Gap, Range};
+use super::things::{Thing, What};
 use crate::kinematics::Posture;
 use crate::model::PairingId;
 use crate::plan::contact::{Contact, Nearest};
@@ -143,7 +144,7 @@ impl Scene {
         let beside = self.bar_ends.beside(bar.id, at);
         beside.into_iter().zip([bar.line.from_m, bar.line.to_m]).any(|(beside, end_m)| {
             let end = Core::Point(end_m);
-            let is_at = |core: &Core| gap_m > core.distance_m(&end) - radii_m - super::AT_STILL_END_M;
+            let is_at = |core: &Core| gap_m > core.distance_m(&end) - radii_m - AT_STILL_END_M;
             let capsule_ends = || cores[at].ends().into_iter().flatten().zip(beside.ends);
             (beside.is_still && is_at(&cores[at])) || capsule_ends().any(|(core, what)| what == End::Still && is_at(&core))
         })

@@ -1,6 +1,6 @@
 //! Between which things motion changes the gap, and how it does.
 
-use super::{Thing, What};
+use super::things::{Thing, What};
 use crate::plan::contact::Contact;
 
 /// Two things whose gap depends on the posture, as indices; the first is moved by fewer joints.
@@ -23,6 +23,9 @@ pub(super) enum End {
     /// Yes, but nearer than the clearance: the capsule is looked at without that rounded end.
     Cut,
 }
+
+/// A gap at a still end is no less than at the end itself, but for rounding.
+pub(super) const AT_STILL_END_M: f64 = 1e-6;
 
 /// Every two things that joints move against one another, but the robot's foot and the table that it stands on.
 pub(super) fn candidates(things: &[Thing]) -> impl Iterator<Item = Pair> + '_ {
