@@ -9,6 +9,7 @@
 
 use ballbar::wire::{FrameReader, ToBoard, ToHost, decode, hello_version};
 use ballbar_tests::any_message;
+use ballbar_tests::at_length::at_length;
 use ballbar_tests::fake_board::FakeBoard;
 use ballbar_tests::parameter_sets::puma;
 use proptest::collection::vec;
@@ -17,7 +18,7 @@ use proptest::test_runner::TestRunner;
 
 #[test]
 fn anything_in_a_frame_reader_and_in_both_decoders() {
-    bolero::check!().with_iterations(200_000).with_max_len(2_000).for_each(|bytes: &[u8]| {
+    bolero::check!().with_iterations(at_length(200_000)).with_max_len(2_000).for_each(|bytes: &[u8]| {
         understand(bytes);
         let mut reader = FrameReader::new();
         let mut frames = 0;
@@ -49,7 +50,7 @@ fn understand(payload: &[u8]) {
 /// contents of commands, so that what lies behind the checksum is reached too.
 #[test]
 fn anything_on_the_link_of_a_board() {
-    bolero::check!().with_iterations(3_000).with_max_len(600).for_each(|bytes: &[u8]| {
+    bolero::check!().with_iterations(at_length(3_000)).with_max_len(600).for_each(|bytes: &[u8]| {
         let Some((kind, bytes)) = bytes.split_first() else { return };
         let mut board = FakeBoard::new();
         board.greet();

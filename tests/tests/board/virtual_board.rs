@@ -5,6 +5,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{BoardHello, MAX_FRAME, PROTOCOL, ProtocolVersion, ResetReason, ToHost, encode};
+use ballbar_tests::at_length::at_length;
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::scenarios::{self, Bench};
 use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions};
@@ -32,10 +33,10 @@ fn a_board_serves_its_host() {
     scenarios::brings_back_the_parameters_before(&bench);
     scenarios::home_at_rest(&bench, &plant);
 
-    let script = scenarios::script(12, 4.5, 3);
+    let script = scenarios::script(at_length(12), 4.5, 3);
     bench.0.play_with_stream(script.clone());
     let (_, recording) = scenarios::record(&bench, script.stations.len(), &["--rate", "1000", "--pose"]);
-    recording.has_every_sample(60_000);
+    recording.has_every_sample(at_length(60_000));
     recording.has_true_stations(&script);
 }
 

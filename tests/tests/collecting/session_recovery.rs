@@ -11,6 +11,7 @@ use ballbar::wire::{
     Answer, BoardHello, Event, MAX_FRAME, PROTOCOL, ParameterSet, Reply, ResetReason, SampleBatch, Stream, ToHost, encode,
 };
 use ballbar::{JointKind, JointVector, LvdtReading, Sample, SettledPose, StillnessCriteria};
+use ballbar_tests::at_length::times;
 use ballbar_tests::command::host_cal_in;
 use host_cal::board::{RobotOnBoard, nominal_lvdt, parameter_set};
 use host_cal::files::open_robot;
@@ -197,17 +198,17 @@ impl Recording {
         let session = self.session();
         let [log, description] = ["stream.bbl", "session.toml"].map(|name| fs::read(session.join(name)).unwrap());
         let other = self.folder.path().join("killed");
-        let mut killed = 0;
+        let (everywhere, mut killed) = (times() > 1, 0);
         for (i, state) in self.states.iter().enumerate() {
             let begins = i.checked_sub(1).map_or(0, |before| self.states[before].log_bytes);
-            // A power cut may leave an older poses.csv than a kill can: all of them are tried at a few places.
+            // A power cut may leave an older poses.csv than a kill can: all of them are tried at a few places, at length at every byte.
             for cut in begins..=state.log_bytes {
                 let is_end = cut == state.log_bytes;
-                if !is_end && cut % 7 != 0 && self.is_dull(begins, state.log_bytes) {
+                if !is_end && !everywhere && cut % 7 != 0 && self.is_dull(begins, state.log_bytes) {
                     continue;
                 }
                 let newest = if is_end { i } else { i.saturating_sub(1) };
-                let oldest = if is_end || cut % 29 == 0 { 0 } else { newest };
+                let oldest = if is_end || everywhere || cut % 29 == 0 { 0 } else { newest };
                 for poses in oldest..=newest {
                     if poses < newest && self.states[poses].poses == self.states[poses + 1].poses {
                         continue;

@@ -7,6 +7,7 @@ use ballbar_calib::identify::{
 };
 use ballbar_calib::model::Dataset;
 use ballbar_calib::simulate::tool_error;
+use ballbar_tests::at_length::at_length;
 use ballbar_tests::experiment::{Puma, worst_parameter_difference};
 
 const SIGMA_M: f64 = 0.084e-3;
@@ -83,8 +84,8 @@ fn all_54_and_the_36_reach_the_same_cost_and_the_same_kinematics() {
 #[test]
 fn deviations_are_as_large_as_the_errors_that_they_stand_for() {
     let puma = Puma::default();
-    let (mut squares, mut count) = (0.0, 0);
-    for seed in 0..24 {
+    let (mut squares, mut count) = (0.0, 0_u32);
+    for seed in 0..at_length(24) as u64 {
         let result = fit_puma(&puma, &puma.shells(0.46, 10, SIGMA_M, seed), &hold(HoldRule::Paper, &[]));
         for parameter in result.parameters.iter().filter(|parameter| parameter.held.is_none()) {
             let truth = puma.truth.chain.parameters()[parameter.parameter.index()];

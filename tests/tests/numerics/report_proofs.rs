@@ -4,6 +4,7 @@ use ballbar::Kinematics;
 use ballbar_calib::assess::{Assessment, Evidence, ProofKind};
 use ballbar_calib::identify::{Fit, FitOptions, fit};
 use ballbar_calib::model::{Dataset, PairingId, PoseRow};
+use ballbar_tests::at_length::at_length;
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::data::real_data;
 use ballbar_tests::experiment::{Puma, dataset};
@@ -92,7 +93,7 @@ fn the_standard_error_is_that_of_postures_and_not_of_lengths() {
     // The scatter of the RMS from set to set, of sets of 36 postures each with three lengths.
     let rows = puma.shells(0.46, 20, 10e-6, 3);
     let fit = fitted(&puma, &rows);
-    let sets: Vec<(f64, f64)> = (0..40)
+    let sets: Vec<(f64, f64)> = (0..at_length(40) as u64)
         .map(|seed| {
             let set = three_lengths_a_posture(&puma, 4, 0.0, 100 + seed);
             let facts = facts(&puma, &rows, &fit, &[("set".to_owned(), &set)]);

@@ -5,6 +5,7 @@ use ballbar_calib::identify::{FitOptions, Hold, fit};
 use ballbar_calib::model::PoseRow;
 use ballbar_calib::plan::{Cell, Expectation, Margins, Pace, Quality, d_optimal};
 use ballbar_calib::simulate::tool_error;
+use ballbar_tests::at_length::at_length;
 use ballbar_tests::experiment::{Puma, dataset};
 use rand::SeedableRng;
 use rand::seq::index::sample;
@@ -73,7 +74,8 @@ fn noise_at_the_tool_is_what_was_expected() {
     let chosen = d_optimal(&pool.rows, 90);
     let measurements: Vec<Measurement<f64>> = chosen.iter().map(|&i| pool.poses[i].measurement).collect();
     let quality = Quality::new(&puma.design.chain, &measurements, &puma.design.limits, &pool.subset).unwrap();
-    let (expected_mm, found_mm) = (quality.amplification * SIGMA_MM, recovered_m(&puma, &pool, &chosen, 100) * 1e3);
+    let fits = at_length(100) as u64;
+    let (expected_mm, found_mm) = (quality.amplification * SIGMA_MM, recovered_m(&puma, &pool, &chosen, fits) * 1e3);
     println!("expected {expected_mm:.3} mm, found {found_mm:.3} mm");
     assert!((found_mm / expected_mm - 1.0).abs() < 0.2, "{found_mm} {expected_mm}");
 }

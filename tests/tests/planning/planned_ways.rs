@@ -7,6 +7,7 @@ use ballbar::{JointKind, Kinematics};
 use ballbar_calib::identify::{FitOptions, fit};
 use ballbar_calib::model::{Rig, Robot};
 use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace, PlanOptions, PlanRow, RowKind, Swing, UnsafePlan};
+use ballbar_tests::at_length::at_length;
 use ballbar_tests::data::real_data;
 use ballbar_tests::plans::{fitted, least_by_naive_cell, options, planned, plausible_robot};
 use ballbar_tests::solids::NaiveCell;
@@ -19,6 +20,7 @@ use rand_chacha::ChaCha8Rng;
 fn keeps_margins(name: &str, pairings: &[(&str, &str)], bars_m: &[f64], poses_per_shell: usize) {
     const STEP: f64 = 0.02;
     const ROBOTS: usize = 1000;
+    let robots = at_length(ROBOTS);
     let (robot, rig) = (open_robot(name).unwrap(), open_rig("triangles").unwrap());
     let options = options(&rig, pairings, bars_m, poses_per_shell);
     let margins = options.margins;
@@ -44,7 +46,7 @@ fn keeps_margins(name: &str, pairings: &[(&str, &str)], bars_m: &[f64], poses_pe
     // Every row with the bar on, and a place on the way to it, in a thousand robots that are not nominal.
     let mut rng = ChaCha8Rng::seed_from_u64(77);
     let mut least_m = f64::INFINITY;
-    for _ in 0..ROBOTS {
+    for _ in 0..robots {
         let kinematics = Kinematics::new(&plausible_robot(&robot.chain, &mut rng));
         for (i, row) in plan.rows.iter().enumerate().filter(|(_, row)| row.bar.is_some()) {
             let mut between = row.q;
@@ -62,7 +64,7 @@ fn keeps_margins(name: &str, pairings: &[(&str, &str)], bars_m: &[f64], poses_pe
             }
         }
     }
-    assert!(least_m >= margins.travel_m, "{name}: {least_m} m of travel in the worst of {ROBOTS} robots");
+    assert!(least_m >= margins.travel_m, "{name}: {least_m} m of travel in the worst of {robots} robots");
 }
 
 #[test]
@@ -207,7 +209,7 @@ fn the_check_sees_the_gaps_that_an_independent_library_sees() {
         let naive = NaiveCell::new(robot, &rig, Margins::default().clearance_m);
         let cell = Cell::new(robot, &rig, 0.075, Margins::default(), Pace::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(8);
-        for i in 0..POSTURES / robots.len() {
+        for i in 0..at_length(POSTURES) / robots.len() {
             let q = naive.random_posture(&mut rng);
             let attached = rig.all_pairings().get(i % 10).copied();
             let (gap_m, between) = naive.gap_m(&q, attached);
@@ -230,9 +232,9 @@ fn what_stays_clear_for_certain_is_clear_wherever_the_joints_go() {
         let cell = Cell::new(&robot, &rig, 0.075, Margins::default(), Pace::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(12);
         let (mut certain, mut asked) = (0, 0);
-        while certain < 300 {
+        while certain < at_length(300) {
             asked += 1;
-            assert!(asked < 100_000, "{name}: {certain}");
+            assert!(asked < at_length(100_000), "{name}: {certain}");
             let a = cell.inverse.random_start(&mut rng);
             let step = 10_f64.powf(rng.random_range(-3.0..-0.5));
             let mut b = a;
