@@ -17,6 +17,11 @@ pub struct JointLimits {
 }
 
 impl JointLimits {
+    /// Whether there is anything between them.
+    pub(super) fn are_a_range(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite() && self.min < self.max
+    }
+
     /// Whether `q` lies within, limits included.
     pub fn contain(&self, q: f64) -> bool {
         (self.min..=self.max).contains(&q)

@@ -151,22 +151,15 @@ impl Plan {
     /// The poses to measure, as if each had been measured without an error.
     pub fn as_dataset(&self, rig: &Rig) -> Dataset {
         let measured = self.rows.iter().filter(|row| row.kind == RowKind::Measure);
-        let pose = |(i, row): (usize, &PlanRow)| PoseRow {
-            pairing: row.pairing,
-            measurement: Measurement {
+        let pose = |(i, row): (usize, &PlanRow)| {
+            let measurement = Measurement {
                 pairing: rig.pairing(row.pairing),
                 q: row.q,
                 length_m: row.bar.map_or(row.bar_m, |bar| bar.length_m),
                 weight: 1.0,
-            },
-            sigma_m: None,
-            set: None,
-            t_s: None,
-            bar_m: Some(row.bar_m),
-            motion: None,
-            file: 0,
-            line: i + 1,
-            number: i + 1,
+            };
+            let number = i + 1;
+            PoseRow { bar_m: Some(row.bar_m), line: number, number, ..PoseRow::of(row.pairing, measurement) }
         };
         Dataset { rows: measured.enumerate().map(pose).collect(), files: Vec::new() }
     }

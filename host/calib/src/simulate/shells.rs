@@ -134,16 +134,9 @@ impl Shells<'_> {
         let within_travel = self.rig.bar.as_ref().is_none_or(|bar| (length_m - self.bar_m).abs() <= bar.travel_m / 2.0);
         (within_travel && length_m > 0.0).then(|| ShellPose {
             row: PoseRow {
-                pairing: id,
-                measurement: ballbar::Measurement { pairing, q, length_m, weight: 1.0 },
-                sigma_m: None,
                 set: Some(tidy(mm_from_m(self.bar_m)).to_string()),
-                t_s: None,
                 bar_m: Some(self.bar_m),
-                motion: None,
-                file: 0,
-                line: 0,
-                number: 0,
+                ..PoseRow::of(id, ballbar::Measurement { pairing, q, length_m, weight: 1.0 })
             },
             latitude_rad,
             longitude_rad,
