@@ -2,6 +2,7 @@
 
 /// The Anderson-Darling test of normality with mean and deviation estimated from the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AndersonDarling {
     /// The statistic A², corrected for the sample size.
     pub statistic: f64,

@@ -4,6 +4,7 @@ use super::residual::{Residual, ResidualSummary};
 
 /// How far the mean of a group of residuals is from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Offset {
     /// Index of the group.
     pub group: usize,

@@ -2,6 +2,7 @@
 
 /// A residual `f = d_measured − d_computed` and its weight, 1 on average.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Residual {
     /// Metres.
     pub value_m: f64,
@@ -18,6 +19,7 @@ impl Residual {
 
 /// Size of a set of residuals, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ResidualSummary {
     /// How many.
     pub count: usize,

@@ -8,6 +8,7 @@ use crate::model::{Dataset, PairingId, PoseRow};
 
 /// Residuals of one pairing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PairingResiduals {
     /// Which.
     pub pairing: PairingId,
@@ -33,6 +34,7 @@ pub fn by_pairing(dataset: &Dataset, residuals: &[Residual]) -> Vec<PairingResid
 
 /// Which test an outlier failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum OutlierTest {
     /// It is far from all residuals.
     All,
@@ -42,6 +44,7 @@ pub enum OutlierTest {
 
 /// A row whose residual stands out.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Outlier {
     /// Row index, from 0.
     pub row: usize,

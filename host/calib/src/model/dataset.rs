@@ -11,6 +11,7 @@ use super::robot::Robot;
 
 /// One measured length, and where the robot stood. [`PoseRow::new`] makes one from numbers.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseRow {
     /// Which chuck and sphere the bar joined.
     pub pairing: PairingId,
@@ -36,6 +37,7 @@ pub struct PoseRow {
 
 /// How the length changed while it was measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Motion {
     /// How fast it grew, metres per second.
     pub rate_m_s: f64,
@@ -87,18 +89,7 @@ impl PoseRow {
 
     /// A measurement with nothing else known of it.
     pub(crate) fn of(pairing: PairingId, measurement: Measurement<f64>) -> Self {
-        Self {
-            pairing,
-            measurement,
-            sigma_m: None,
-            set: None,
-            t_s: None,
-            bar_m: None,
-            motion: None,
-            file: 0,
-            line: 0,
-            number: 0,
-        }
+        Self { pairing, measurement, sigma_m: None, set: None, t_s: None, bar_m: None, motion: None, file: 0, line: 0, number: 0 }
     }
 }
 
@@ -107,6 +98,7 @@ impl PoseRow {
 ///
 /// "Files" are wherever rows come from: a name for messages, no more.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "super::stored::DatasetParts"))]
 pub struct Dataset {
     /// The rows.
     pub rows: Vec<PoseRow>,
@@ -116,6 +108,7 @@ pub struct Dataset {
 
 /// Something about a row that may be a mistake but is no reason to refuse it.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum RowWarning {
     /// A joint stood beyond its limits.
     BeyondLimits {

@@ -9,6 +9,7 @@ use crate::units::{ScreenUnit, tidy};
 
 /// Limits of a joint's encoder output q, radians or metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct JointLimits {
     /// Lower limit.
     pub min: f64,
@@ -30,6 +31,7 @@ impl JointLimits {
 
 /// A joint that stands beyond its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BeyondLimits {
     /// Number of the joint, from 1.
     pub joint: usize,

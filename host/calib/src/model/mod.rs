@@ -6,6 +6,8 @@ mod limits;
 mod rig;
 mod robot;
 mod solids;
+#[cfg(feature = "serde")]
+mod stored;
 
 pub use calibration::{Calibration, CalibrationVerdict};
 pub use dataset::{Dataset, MixedSigma, Motion, PoseError, PoseRow, RowWarning};

@@ -9,6 +9,7 @@ use super::solids::Solids;
 
 /// A chuck (base frame) or a sphere (tool frame).
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NamedPoint {
     /// Its name in poses and pairings.
     pub name: String,
@@ -25,6 +26,7 @@ impl NamedPoint {
 
 /// Indices of a chuck and a sphere of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PairingId {
     /// Index into [`Rig::chucks`].
     pub chuck: usize,
@@ -34,6 +36,7 @@ pub struct PairingId {
 
 /// The telescoping bar.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bar {
     /// Lengths at mid travel, one an extension rod, metres.
     pub lengths_m: Vec<f64>,
@@ -50,6 +53,7 @@ impl Bar {
 
 /// Where the bar can be attached. [`Rig::new`] makes one from numbers.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "super::stored::RigParts"))]
 pub struct Rig {
     /// Chucks on the table, base frame.
     pub chucks: Vec<NamedPoint>,

@@ -8,6 +8,7 @@ use super::limits::JointLimits;
 
 /// A robot as it is believed to be. [`Robot::new`] makes one from numbers.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "super::stored::RobotParts"))]
 pub struct Robot {
     /// What people call it.
     pub name: String,
@@ -25,6 +26,7 @@ pub struct Robot {
 
 /// How a joint's encoder counts.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EncoderFacts {
     /// Counts per radian or metre, and from index to index; `None` where the file does not say.
     pub encoder: Option<Encoder<f64>>,
