@@ -7,7 +7,7 @@ use std::error::Error;
 
 use ballbar_calib::identify::{FitOptions, fit};
 use ballbar_calib::model::{Bar, Dataset, JointLimits, NamedPoint, PairingId, PoseRow, Rig, Robot};
-use ballbar_calib::units::{ScreenUnit, mm_from_m};
+use ballbar_calib::units::{ScreenUnit, fixed, mm_from_m};
 use ballbar_calib::{Chain, JointKind, Kinematics, Parameter, designs};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -31,9 +31,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("\nparameter     design       fitted    deviation");
     for fitted in fit.parameters.iter().filter(|fitted| fitted.held.is_none()) {
         let unit = ScreenUnit::from(fitted.unit);
-        let [initial, value] = [fitted.initial, fitted.fitted].map(|value| unit.from_si(value));
-        let std = fitted.std.map_or("?".to_owned(), |std| format!("{:.4}", unit.from_si(std)));
-        println!("{:9} {initial:10.4} {value:12.4} {std:>12} {}", fitted.parameter.to_string(), unit.name());
+        let shown = |value: f64| fixed(unit.from_si(value), 4);
+        let std = fitted.std.map_or("?".to_owned(), shown);
+        let name = fitted.parameter.to_string();
+        println!("{name:9} {:>10} {:>12} {std:>12} {}", shown(fitted.initial), shown(fitted.fitted), unit.name());
     }
     Ok(())
 }
@@ -78,7 +79,8 @@ struct Reading {
     length_m: f64,
 }
 
-/// What was read at each pose: here of an arm whose links differ a little from their design, without any noise.
+/// What was read at each pose: here of an arm whose links differ a little from their design, to some hundredths of a
+/// millimetre.
 fn measured(robot: &Robot, rig: &Rig) -> Result<Vec<Reading>, Box<dyn Error>> {
     let mut truth = designs::puma560().chain;
     for (name, change) in [("x3", 0.0015), ("z1", -0.002), ("gamma4", 0.002), ("scale2", 0.001)] {
@@ -89,7 +91,9 @@ fn measured(robot: &Robot, rig: &Rig) -> Result<Vec<Reading>, Box<dyn Error>> {
         let (chuck, sphere) = (i % 3, i / 3 % 3);
         let q_rad = std::array::from_fn(|joint| 1.5 * (((joint + 2) as f64).sqrt() * (i * i + i) as f64).sin());
         let pairing = rig.pairing(PairingId { chuck, sphere });
-        Ok(Reading { chuck, sphere, q_rad, length_m: truth.length(&robot.chain.joint_vector(&q_rad)?, &pairing) })
+        let noise_m = 30e-6 * (37.0 * (i * i) as f64).sin();
+        let length_m = truth.length(&robot.chain.joint_vector(&q_rad)?, &pairing) + noise_m;
+        Ok(Reading { chuck, sphere, q_rad, length_m })
     };
     (0..500).map(pose).collect()
 }

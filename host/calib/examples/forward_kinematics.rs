@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let q = robot.chain.joint_vector(&[0.3, -0.5, 0.4, 0.2, -0.6, 1.0])?;
     let base_from_tool = kinematics.base_from_tool(&q);
     println!("joints, degrees: {}", degrees(&q));
-    println!("tool, mm: {:.2}", base_from_tool.translation_m.map(mm_from_m).transpose());
+    println!("tool, mm: {:.2?}", base_from_tool.translation_m.map(mm_from_m).as_slice());
     println!("turned by Rz·Ry·Rx, degrees: {:.2?}", link_angles(&base_from_tool.rotation).map(f64::to_degrees));
 
     // Of an arm without a closed form branches are looked for from random starts: hence the generator.

@@ -14,8 +14,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (robot, rig) = (designs::puma560(), designs::triangles());
     let bar = rig.bar.as_ref().ok_or("the rig has no bar")?;
     let pairings = vec![PairingId { chuck: 0, sphere: 0 }, PairingId { chuck: 1, sphere: 1 }];
-    // Few poses, to be quick: 90 on each of nine shells are the usual plan.
-    let options = PlanOptions { poses_per_shell: 10, bars_m: vec![bar.lengths_m[0]], ..PlanOptions::new(pairings, bar) };
+    // 90 poses on each of nine shells are the usual plan; fewer are quicker to look at.
+    let options = PlanOptions { bars_m: vec![bar.lengths_m[0]], ..PlanOptions::new(pairings, bar, 20) };
 
     let plan = plan(&robot, &rig, &options, &|_| ())?;
     for shell in &plan.shells {

@@ -49,17 +49,16 @@ pub struct PlanOptions {
 }
 
 impl PlanOptions {
-    /// The usual 90 poses a shell on latitudes of 15° to 75°, for each of the bar's lengths, with the usual margins and pace. `pairings` are
-    /// of the rig that is planned for ([`Rig::all_pairings`]); what is to be otherwise is set in its field.
-    pub fn new(pairings: Vec<PairingId>, bar: &Bar) -> Self {
+    /// So many poses on each shell (90 are usual), for each of the bar's lengths, with the usual latitudes of 15° to 75°, margins and pace.
+    /// `pairings` are of the rig that is planned for ([`Rig::all_pairings`]); what is to be otherwise is set in its field.
+    pub fn new(pairings: Vec<PairingId>, bar: &Bar, poses_per_shell: usize) -> Self {
         const LATITUDES_DEG: [f64; 5] = [15.0, 30.0, 45.0, 60.0, 75.0];
-        const POSES: usize = 90;
         Self {
             pairings,
             bars_m: bar.lengths_m.clone(),
             travel_m: bar.travel_m,
-            grid: Grid::of(&LATITUDES_DEG, POSES),
-            poses_per_shell: POSES,
+            grid: Grid::of(&LATITUDES_DEG, poses_per_shell),
+            poses_per_shell,
             optimal: None,
             margins: Margins::default(),
             pace: Pace::default(),
@@ -199,9 +198,9 @@ impl Plan {
 /// let (robot, rig) = (designs::puma560(), designs::triangles());
 /// let bar = rig.bar.as_ref().ok_or("no bar")?;
 /// let pairings = vec![PairingId { chuck: 0, sphere: 0 }];
-/// let options = PlanOptions { poses_per_shell: 4, bars_m: vec![0.46], ..PlanOptions::new(pairings, bar) };
+/// let options = PlanOptions { bars_m: vec![0.46], ..PlanOptions::new(pairings, bar, 10) };
 /// let plan = plan(&robot, &rig, &options, &|_| ())?;
-/// assert!(plan.shells[0].measured >= 4);
+/// assert!(plan.shells[0].measured > 5);
 ///
 /// // What moves a robot takes a plan that was looked at in fine steps.
 /// let cell = Cell::new(&robot, &rig, options.travel_m, options.margins, options.pace)?;
