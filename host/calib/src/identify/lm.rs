@@ -122,7 +122,9 @@ const SMALLEST_LAMBDA: f64 = 1e-12;
 /// Above this relative λ a step no longer changes anything.
 const LARGEST_LAMBDA: f64 = 1e12;
 
-/// Minimises `Σ w (d_measured − d_computed)²` over the free parameters of `chain`, beginning with its present values.
+/// Minimises `Σ w (d_measured − d_computed)²` over the free parameters of `chain`, beginning with its present values: the paper's eq. 7 and 10,
+/// after K. Levenberg, Quarterly of Applied Mathematics 2(2), 1944, and D. W. Marquardt, J. SIAM 11(2), 1963. Never fails: [`Status`] says
+/// where it ended.
 pub fn solve(chain: &Chain<f64>, measurements: &[Measurement<f64>], free: &FreeParameters, options: &LmOptions) -> Solution {
     Solver::new(chain, measurements, free, options).run()
 }

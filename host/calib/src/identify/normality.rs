@@ -10,7 +10,7 @@ pub struct AndersonDarling {
     pub p_value: f64,
 }
 
-/// Tests a sample; `None` for fewer than eight values or a sample without spread.
+/// Tests a sample, of any unit and order; `None` for fewer than eight values or a sample without spread.
 ///
 /// Statistic and p-value by Stephens, in D'Agostino and Stephens, "Goodness-of-Fit Techniques" (1986), section 4.8.5, table 4.9.
 pub fn anderson_darling(sample: &[f64]) -> Option<AndersonDarling> {

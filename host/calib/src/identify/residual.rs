@@ -32,7 +32,7 @@ pub struct ResidualSummary {
 }
 
 impl ResidualSummary {
-    /// Summarises residuals; RMS and mean are weighted (all weights alike: the plain ones).
+    /// Summarises residuals; RMS and mean are weighted (all weights alike: the plain ones), and not a number where there are none.
     pub fn new(residuals: &[Residual]) -> Self {
         let weight: f64 = residuals.iter().map(|f| f.weight).sum();
         Self {

@@ -58,7 +58,7 @@ pub struct InverseKinematics {
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Branches {
-    /// Within limits, each joint at the turn nearest to the middle of its range.
+    /// Within limits, each joint at the turn nearest to the middle of its range; radians or metres.
     pub within_limits: Vec<JointVector<f64>>,
     /// How many more there are that the limits forbid.
     pub beyond_limits: usize,
@@ -86,7 +86,7 @@ impl InverseKinematics {
         &self.skeleton
     }
 
-    /// Joint vectors that bring the tool to a pose.
+    /// Joint vectors that bring the tool to a pose: all of them in closed form, otherwise those that `effort` finds.
     pub fn branches(&self, base_from_tool: &Pose<f64>, effort: Thoroughness, rng: &mut ChaCha8Rng) -> Branches {
         match &self.closed {
             Some(closed) => self.sorted(closed.solve(base_from_tool)),

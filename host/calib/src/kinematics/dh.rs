@@ -67,6 +67,7 @@ pub struct NearlyParallel {
     pub angle_rad: f64,
 }
 
+/// A table of J. Denavit and R. S. Hartenberg (ASME J. Applied Mechanics 22, 1955) for a whole chain:
 /// `base_from_first · row 1 · … · row J · last_from_tool`.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -79,7 +80,7 @@ pub struct DhTable {
     pub rows: Vec<DhRow>,
     /// What stands behind the last row.
     pub last_from_tool: Pose<f64>,
-    /// Where the values run away.
+    /// Where the values run away: such axes are better described otherwise (S. A. Hayati, IEEE CDC 1983).
     pub nearly_parallel: Vec<NearlyParallel>,
 }
 

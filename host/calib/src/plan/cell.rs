@@ -102,7 +102,7 @@ pub struct Cell<'a> {
 }
 
 impl<'a> Cell<'a> {
-    /// Prepares a robot at its rig.
+    /// Prepares a robot at its rig, with a bar that travels `travel_m` from end to end.
     ///
     /// # Errors
     /// [`FixturesOverlap`] when the rig cannot be as it is described.
