@@ -37,7 +37,7 @@ fn scripts() -> Result<Option<Scripts>, Box<dyn Error>> {
     match (chosen("CARGO_FEATURE_F405"), chosen("CARGO_FEATURE_AN386")) {
         (true, true) => Err("features f405 and an386: a build is for one board".into()),
         // cortex-m-rt's script includes the board's.
-        (true, false) => Ok(Some(Scripts { of_board: "../memory.x", first: "link.x" })),
+        (true, false) => Ok(Some(Scripts { of_board: "memory.x", first: "link.x" })),
         (false, true) => Ok(Some(Scripts { of_board: "src/bin/an386/an386.x", first: "an386.x" })),
         (false, false) => Ok(None),
     }

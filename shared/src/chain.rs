@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +21,8 @@ pub enum JointKind {
 }
 
 /// A link's fixed transform `L = Trans(x, y, z) · Rz(alpha) · Ry(beta) · Rx(gamma)`, distal frame to proximal frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "S: Real + Serialize", deserialize = "S: Real + Deserialize<'de>"))]
 pub struct Link<S> {
     /// `(x, y, z)` in the proximal frame, metres.
     pub translation_m: Vector3<S>,
@@ -33,7 +35,7 @@ pub struct Link<S> {
 }
 
 /// A joint's encoder model `θ = offset + scale · q` (the paper's eq. 2); units as the joint's kind has them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint<S> {
     /// Revolute or prismatic.
     pub kind: JointKind,
@@ -44,7 +46,7 @@ pub struct Joint<S> {
 }
 
 /// Encoder outputs of all joints, radians or metres as the joint is. Made by [`Chain::joint_vector`], which checks the count.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointVector<S>(pub(crate) [S; MAX_JOINTS]);
 
 impl<S: Real> JointVector<S> {
@@ -72,11 +74,38 @@ impl<S: Real> JointVector<S> {
 /// A serial chain `T = L1 J1 L2 J2 … LJ JJ L(J+1)`, from the tool (end-effector) frame to the base (global) frame.
 ///
 /// Parameters are stored flat, in the order of the paper's Table II (see [`Parameter`]): 8·J + 6 numbers, SI units.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(
+    into = "Written<S>",
+    try_from = "Written<S>",
+    bound(serialize = "S: Real + Serialize", deserialize = "S: Real + Deserialize<'de>")
+)]
 pub struct Chain<S> {
     joints: usize,
     kinds: [JointKind; MAX_JOINTS],
     parameters: Row<S>,
+}
+
+/// A chain as it is stored: what [`Chain::new`] takes, which checks it when it is read.
+#[derive(Serialize, Deserialize)]
+struct Written<S> {
+    kinds: Vec<JointKind, MAX_JOINTS>,
+    parameters: Vec<S, MAX_PARAMETERS>,
+}
+
+impl<S: Real> From<Chain<S>> for Written<S> {
+    fn from(chain: Chain<S>) -> Self {
+        let kinds = chain.joint_kinds().iter().copied().collect();
+        Self { kinds, parameters: chain.parameters().iter().copied().collect() }
+    }
+}
+
+impl<S: Real> TryFrom<Written<S>> for Chain<S> {
+    type Error = ChainError;
+
+    fn try_from(written: Written<S>) -> Result<Self, ChainError> {
+        Self::new(&written.kinds, &written.parameters)
+    }
 }
 
 /// Why a chain or a joint vector could not be made.
@@ -254,7 +283,8 @@ mod tests {
     extern crate std;
     use super::*;
     use JointKind::{Prismatic, Revolute};
-    use std::{vec, vec::Vec};
+    use std::vec;
+    use std::vec::Vec;
 
     #[test]
     fn what_stays_free_counts_the_independent_parameters() {

@@ -3,12 +3,15 @@
 //! No 4×4 products and no numerical differences. One sweep from the tool to the base carries the sphere; one sweep from the
 //! base to the tool carries the wrench of a unit force along the bar, and each parameter's column is one component of it.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     Chain, Joint, JointKind, JointVector, Link, MAX_JOINTS, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Real, Row, Vector3,
 };
 
 /// Where the bar's two ends are: a chuck on the table and a sphere on the tool.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "S: Real + Serialize", deserialize = "S: Real + Deserialize<'de>"))]
 pub struct Pairing<S> {
     /// Centre of the chuck `c` in the base frame, metres.
     pub chuck_base_m: Vector3<S>,
@@ -17,7 +20,8 @@ pub struct Pairing<S> {
 }
 
 /// One settled length of the bar, and where the robot stood.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "S: Real + Serialize", deserialize = "S: Real + Deserialize<'de>"))]
 pub struct Measurement<S> {
     /// The bar's two ends.
     pub pairing: Pairing<S>,
@@ -30,7 +34,8 @@ pub struct Measurement<S> {
 }
 
 /// A rigid pose: `point_base = rotation · point_tool + translation_m`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "S: Real + Serialize", deserialize = "S: Real + Deserialize<'de>"))]
 pub struct Pose<S> {
     /// Rotation from the tool's axes to the base's.
     pub rotation: Matrix3<S>,

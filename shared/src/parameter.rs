@@ -3,6 +3,9 @@
 use core::fmt;
 use core::str::FromStr;
 
+use serde::de::{Error, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
 use crate::{JointKind, MAX_JOINTS, PARAMETERS_PER_JOINT};
 
 /// Which of a link's six or a joint's two parameters; the order is that of the paper's Table II.
@@ -55,7 +58,8 @@ impl ParameterKind {
 }
 
 /// The SI unit of a parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ParameterUnit {
     /// A length.
     Metre,
@@ -100,6 +104,33 @@ impl Parameter {
     /// Which of the link's or joint's parameters.
     pub const fn kind(self) -> ParameterKind {
         self.kind
+    }
+}
+
+/// As its name, `gamma7`.
+impl Serialize for Parameter {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Parameter {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_str(NameVisitor)
+    }
+}
+
+struct NameVisitor;
+
+impl Visitor<'_> for NameVisitor {
+    type Value = Parameter;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a parameter, such as gamma7")
+    }
+
+    fn visit_str<E: Error>(self, name: &str) -> Result<Parameter, E> {
+        name.parse().map_err(E::custom)
     }
 }
 

@@ -4,11 +4,14 @@
 use core::cmp::Ordering;
 use core::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::normal::PACKED;
 use crate::{MAX_PARAMETERS, NormalEquations, Real, Row};
 
 /// What λ is multiplied with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Damping {
     /// `λI`, as the paper has it (eq. 7); metres and radians weigh alike.
     #[default]

@@ -19,6 +19,7 @@ pub fn tidy(value: f64) -> f64 {
 
 /// A unit as files and screens have it, and its size in SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum ScreenUnit {
     /// Millimetres, for metres.
     Millimetre,

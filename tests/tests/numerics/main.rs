@@ -2,6 +2,7 @@
 
 mod assessments;
 mod built_in_robots;
+mod designs;
 mod golden;
 mod gradients;
 mod identification;
@@ -11,3 +12,4 @@ mod ranks;
 mod real_data;
 mod report_proofs;
 mod robots;
+mod stored;

@@ -10,6 +10,7 @@ use crate::identify::{AndersonDarling, Offset, Residual, Trend, anderson_darling
 
 /// What the result is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Answer {
     /// Lengths left out of the fit are predicted better than by the design, and nothing stands against it.
     Calibrated,
@@ -45,6 +46,7 @@ impl Answer {
 
 /// The answer and all that it rests on.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Assessment {
     /// What the result is called.
     pub answer: Answer,
@@ -72,7 +74,32 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    /// Judges a fit.
+    /// Judges a fit. [`Answer::Calibrated`] and [`Answer::Reserved`] can be used, [`Answer::Unchanged`] says to keep what there is.
+    ///
+    /// ```
+    /// use ballbar_calib::assess::{Answer, Assessment, Evidence};
+    /// use ballbar_calib::designs;
+    /// use ballbar_calib::identify::{FitOptions, fit};
+    /// use ballbar_calib::model::Dataset;
+    /// use ballbar_calib::simulate::Shells;
+    ///
+    /// let (design, rig) = (designs::puma560(), designs::triangles());
+    /// let mut truth = design.clone();
+    /// truth.chain.parameters_mut()[16] += 0.002; // x3
+    /// let pairings = rig.all_pairings();
+    /// let shells = Shells {
+    ///     planned_with: &design, truth: &truth, rig: &rig, pairings: &pairings, bar_m: 0.46, per_pairing: 20, sigma_m: 50e-6, seed: 1,
+    /// };
+    /// let poses = Dataset::new("simulated", shells.simulate(|| ())?.into_iter().map(|pose| pose.row).collect())?;
+    /// let fit = fit(&design, &poses, &FitOptions::default())?;
+    ///
+    /// let assessment = Assessment::new(&Evidence::new(&design, &rig, &poses, &fit));
+    /// assert_eq!(assessment.answer, Answer::Calibrated, "{:?}", assessment.reasons);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Panics
+    /// When the evidence does not belong together: a fit to other rows, or rows of another rig.
     pub fn new(evidence: &Evidence<'_>) -> Self {
         let Evidence { robot, dataset, fit, .. } = evidence;
         let order = Order::new(&dataset.rows.iter().map(|row| row.t_s).collect::<Vec<_>>());

@@ -19,3 +19,11 @@ pub struct Evidence<'a> {
     /// The largest RMS residual that is believed, metres, in place of the usual one ([`super::RmsLimit`]).
     pub max_rms_m: Option<f64>,
 }
+
+impl<'a> Evidence<'a> {
+    /// A fit and what it was made from; [`fit`](crate::identify::fit()) has to have made it of just these. What it has not seen is set in
+    /// [`Evidence::unseen`].
+    pub fn new(robot: &'a Robot, rig: &'a Rig, dataset: &'a Dataset, fit: &'a Fit) -> Self {
+        Self { robot, rig, dataset, fit, unseen: &[], max_rms_m: None }
+    }
+}

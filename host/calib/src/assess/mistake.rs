@@ -13,6 +13,7 @@ use crate::units::{fixed, mm_from_m};
 
 /// One mistake, of all rows alike.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mistake {
     words: String,
     remedy: Remedy,
@@ -27,6 +28,7 @@ impl fmt::Display for Mistake {
 
 /// How rows are put right.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 enum Remedy {
     /// The chuck that each name stands for, by index.
     Chucks(Vec<usize>),

@@ -7,6 +7,7 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// Where each pose lies in the order of measurement.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Order {
     /// Whether times order the poses. Those of several sessions may start anew; then the order says more.
     pub is_timed: bool,

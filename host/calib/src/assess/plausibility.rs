@@ -10,6 +10,7 @@ use crate::units::{ScreenUnit, fixed};
 
 /// A part of a chain that changed by more than designs are off.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Change {
     /// Which part, such as `the origin of link 3`.
     pub part: String,

@@ -10,6 +10,7 @@ use crate::model::{Dataset, PoseRow};
 
 /// What keeps lengths apart from the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum ProofKind {
     /// No fit has seen them, nor another length of their postures.
     Apart,
@@ -21,6 +22,7 @@ pub enum ProofKind {
 
 /// Lengths that the fit has not seen.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Proof {
     /// Which lengths, to follow "on".
     pub name: String,

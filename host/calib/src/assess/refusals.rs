@@ -11,6 +11,7 @@ use crate::units::{fixed, mm_from_m};
 
 /// How large an RMS residual is believed, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RmsLimit {
     /// Of a length of weight 1, metres.
     pub limit_m: f64,
@@ -20,6 +21,7 @@ pub struct RmsLimit {
 
 /// What a limit rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum RmsGround {
     /// Whoever asks has set it.
     Asked,
@@ -44,6 +46,7 @@ impl RmsLimit {
 
 /// One reason why a fit is not worth keeping. Its text is a whole sentence.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Refusal {
     /// The solve did not end at a minimum.
     NoMinimum(Status),

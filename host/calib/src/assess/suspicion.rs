@@ -13,6 +13,7 @@ use crate::units::{fixed, mm_from_m};
 
 /// What may be wrong. Its text is a whole sentence.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Suspicion {
     /// With one of these mistakes put right, the lengths fit.
     Mistakes {

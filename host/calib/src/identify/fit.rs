@@ -16,6 +16,7 @@ use crate::model::{Dataset, Robot};
 
 /// What to hold, and how to step.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FitOptions {
     /// Parameters that stay at their design values.
     pub hold: Hold,
@@ -41,6 +42,7 @@ pub enum FitError {
 
 /// One parameter before and after.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FittedParameter {
     /// Which.
     pub parameter: Parameter,
@@ -58,6 +60,7 @@ pub struct FittedParameter {
 
 /// How well a fit to some poses predicts the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CrossValidation {
     /// Parts that were left out in turn.
     pub folds: usize,
@@ -70,6 +73,7 @@ pub struct CrossValidation {
 
 /// The result of a fit.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Fit {
     /// The fitted chain, why the solve ended, its iterations and the course of its RMS.
     pub solution: Solution,
@@ -111,7 +115,32 @@ impl Fit {
     }
 }
 
-/// Fits the robot's parameters to the dataset.
+/// Fits the robot's parameters to the dataset: Levenberg-Marquardt on `Σ w (d_measured − d_computed)²` ([`solve`]) from the design, over
+/// the parameters that [`FitOptions::hold`] leaves free; then what the result is worth, by linear theory and by poses left out in turn.
+///
+/// The minimum is the paper's least-squares solution (A. Goswami, A. Quaid and M. Peshkin, IEEE Control Systems 13(5), 1993); which parameters
+/// are free is found anew for each dataset ([`Identifiability`]).
+///
+/// ```
+/// use ballbar_calib::designs;
+/// use ballbar_calib::identify::{FitOptions, fit};
+/// use ballbar_calib::model::Dataset;
+/// use ballbar_calib::simulate::Shells;
+///
+/// let (design, rig) = (designs::puma560(), designs::triangles());
+/// let mut truth = design.clone();
+/// truth.chain.parameters_mut()[16] += 0.002; // x3
+/// let pairings = rig.all_pairings();
+/// let shells = Shells {
+///     planned_with: &design, truth: &truth, rig: &rig, pairings: &pairings, bar_m: 0.46, per_pairing: 20, sigma_m: 0.0, seed: 1,
+/// };
+/// let poses = Dataset::new("simulated", shells.simulate(|| ())?.into_iter().map(|pose| pose.row).collect())?;
+///
+/// let fit = fit(&design, &poses, &FitOptions::default())?;
+/// assert!(fit.solution.status.is_minimum() && fit.fitted.rms_m < 1e-9);
+/// assert!((fit.solution.chain.parameters()[16] - truth.chain.parameters()[16]).abs() < 1e-8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`FitError`] when there are no more poses than free parameters, or when a parameter is to be held that the robot lacks.

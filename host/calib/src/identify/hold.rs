@@ -8,6 +8,7 @@ use super::identifiability::{Finding, Identifiability};
 
 /// Which parameters stay at their design values: a rule, and parameters by name besides.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Hold {
     /// For all of them.
     pub rule: HoldRule,
@@ -17,6 +18,7 @@ pub struct Hold {
 
 /// By which most parameters are held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum HoldRule {
     /// Hold what the data do not identify.
     #[default]
@@ -55,6 +57,7 @@ impl Hold {
 
 /// Why a parameter stays at its design value.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Held {
     /// Its name was given.
     ByName,

@@ -25,6 +25,7 @@ pub fn plausible_error(unit: ParameterUnit) -> f64 {
 
 /// What the poses say of one parameter.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Finding {
     /// It belongs to the independent subset.
     Identified,
@@ -104,12 +105,29 @@ fn list(parameters: &[Parameter]) -> String {
     }
 }
 
-/// What a set of poses can tell about a chain.
+/// What a set of poses can tell about a chain: the rank of its Jacobian, an independent subset of its columns, and what is with the others.
+///
+/// ```
+/// use ballbar_calib::designs;
+/// use ballbar_calib::identify::Identifiability;
+/// use ballbar_calib::simulate::Shells;
+///
+/// let (robot, rig) = (designs::puma560(), designs::triangles());
+/// let pairings = rig.all_pairings();
+/// let shells = Shells {
+///     planned_with: &robot, truth: &robot, rig: &rig, pairings: &pairings, bar_m: 0.46, per_pairing: 20, sigma_m: 0.0, seed: 1,
+/// };
+/// let poses: Vec<_> = shells.simulate(|| ())?.into_iter().map(|pose| pose.row.measurement).collect();
+/// let found = Identifiability::new(&robot.chain, &poses, &robot.limits, &[]);
+/// assert_eq!((found.spectrum.rank, robot.chain.independent_parameters()), (36, 36));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Identifiability {
     /// Singular values of all columns.
     pub spectrum: Spectrum,
-    /// One finding a parameter.
+    /// One finding a parameter, in parameter order.
     pub findings: Vec<Finding>,
     /// RMS of what no linear change of the independent parameters explains, metres: the noise as the data show it. Zero when
     /// there are no more rows than independent parameters.

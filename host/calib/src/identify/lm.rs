@@ -4,6 +4,7 @@ use ballbar::{Chain, DampedSolver, Damping, FreeParameters, Kinematics, MAX_PARA
 
 /// Bounds and damping of a solve.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LmOptions {
     /// What λ multiplies.
     pub damping: Damping,
@@ -19,6 +20,7 @@ impl Default for LmOptions {
 
 /// Why a solve ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Status {
     /// A minimum was reached, and the parameters moved.
     Converged(ConvergenceTest),
@@ -36,6 +38,7 @@ pub enum Status {
 
 /// Which test a converged solve met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum ConvergenceTest {
     /// The residual is orthogonal to every free column: the largest cosine is below 1e-10.
     Gradient,
@@ -87,6 +90,7 @@ impl Status {
 
 /// Where a solve ended.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Solution {
     /// Why it ended.
     pub status: Status,
@@ -118,7 +122,9 @@ const SMALLEST_LAMBDA: f64 = 1e-12;
 /// Above this relative λ a step no longer changes anything.
 const LARGEST_LAMBDA: f64 = 1e12;
 
-/// Minimises `Σ w (d_measured − d_computed)²` over the free parameters of `chain`, beginning with its present values.
+/// Minimises `Σ w (d_measured − d_computed)²` over the free parameters of `chain`, beginning with its present values: the paper's eq. 7 and 10,
+/// after K. Levenberg, Quarterly of Applied Mathematics 2(2), 1944, and D. W. Marquardt, J. SIAM 11(2), 1963. Never fails: [`Status`] says
+/// where it ended.
 pub fn solve(chain: &Chain<f64>, measurements: &[Measurement<f64>], free: &FreeParameters, options: &LmOptions) -> Solution {
     Solver::new(chain, measurements, free, options).run()
 }

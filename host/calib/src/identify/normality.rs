@@ -2,6 +2,7 @@
 
 /// The Anderson-Darling test of normality with mean and deviation estimated from the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AndersonDarling {
     /// The statistic A², corrected for the sample size.
     pub statistic: f64,
@@ -9,7 +10,7 @@ pub struct AndersonDarling {
     pub p_value: f64,
 }
 
-/// Tests a sample; `None` for fewer than eight values or a sample without spread.
+/// Tests a sample, of any unit and order; `None` for fewer than eight values or a sample without spread.
 ///
 /// Statistic and p-value by Stephens, in D'Agostino and Stephens, "Goodness-of-Fit Techniques" (1986), section 4.8.5, table 4.9.
 pub fn anderson_darling(sample: &[f64]) -> Option<AndersonDarling> {

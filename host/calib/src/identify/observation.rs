@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 /// of all columns and the angles between them. Metres per SI unit, and metres.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// One column a parameter of the chain.
+    /// At most P + 1 rows, one column for each of the P parameters of the chain.
     pub jacobian: DMatrix<f64>,
     /// Residuals, measured less computed, seen from the rows of `jacobian`.
     pub residual_m: DVector<f64>,

@@ -4,6 +4,7 @@ use super::residual::{Residual, ResidualSummary};
 
 /// How far the mean of a group of residuals is from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Offset {
     /// Index of the group.
     pub group: usize,
@@ -15,7 +16,7 @@ pub struct Offset {
     pub is_beyond_chance: bool,
 }
 
-/// The mean that is the most standard errors from zero. `sigma_m` is the deviation of a length of weight 1 by the fit, which has
+/// The mean that is the most standard errors from zero, by Student's t with Bonferroni's correction. `sigma_m` is the deviation of a length of weight 1 by the fit, which has
 /// `freedom` degrees of freedom left; a group of three has too few of its own to judge by. `None` without scatter or groups.
 pub fn farthest_offset(groups: &[Vec<Residual>], sigma_m: f64, freedom: usize) -> Option<Offset> {
     /// Chance that any group is said to be off while none is; shared among them (Bonferroni).

@@ -6,7 +6,7 @@ use ballbar::{JointKind, JointVector};
 /// Radians (0.05°) and metres.
 const SAME: (f64, f64) = (0.000_873, 0.000_05);
 
-/// The posture of every row, numbered from 0 as they come first.
+/// The posture of every joint vector (radians or metres, as `kinds` of the chain's joints has it), numbered from 0 as they come first.
 pub fn postures<'a>(kinds: &[JointKind], rows: impl IntoIterator<Item = &'a JointVector<f64>>) -> Vec<usize> {
     let rows: Vec<&[f64]> = rows.into_iter().map(|q| &q.as_array()[..kinds.len()]).collect();
     let same = |kind: JointKind| if kind == JointKind::Revolute { SAME.0 } else { SAME.1 };

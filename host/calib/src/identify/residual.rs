@@ -2,6 +2,7 @@
 
 /// A residual `f = d_measured − d_computed` and its weight, 1 on average.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Residual {
     /// Metres.
     pub value_m: f64,
@@ -18,6 +19,7 @@ impl Residual {
 
 /// Size of a set of residuals, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ResidualSummary {
     /// How many.
     pub count: usize,
@@ -30,7 +32,7 @@ pub struct ResidualSummary {
 }
 
 impl ResidualSummary {
-    /// Summarises residuals; RMS and mean are weighted (all weights alike: the plain ones).
+    /// Summarises residuals; RMS and mean are weighted (all weights alike: the plain ones), and not a number where there are none.
     pub fn new(residuals: &[Residual]) -> Self {
         let weight: f64 = residuals.iter().map(|f| f.weight).sum();
         Self {

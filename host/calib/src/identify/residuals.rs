@@ -8,6 +8,7 @@ use crate::model::{Dataset, PairingId, PoseRow};
 
 /// Residuals of one pairing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PairingResiduals {
     /// Which.
     pub pairing: PairingId,
@@ -15,7 +16,7 @@ pub struct PairingResiduals {
     pub summary: ResidualSummary,
 }
 
-/// Residuals of all rows.
+/// Residuals of all rows, in their order.
 pub fn residuals(chain: &Chain<f64>, dataset: &Dataset) -> Vec<Residual> {
     let kinematics = Kinematics::new(chain);
     let of = |row: &PoseRow| Residual { value_m: kinematics.residual(&row.measurement), weight: row.measurement.weight };
@@ -33,6 +34,7 @@ pub fn by_pairing(dataset: &Dataset, residuals: &[Residual]) -> Vec<PairingResid
 
 /// Which test an outlier failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum OutlierTest {
     /// It is far from all residuals.
     All,
@@ -42,6 +44,7 @@ pub enum OutlierTest {
 
 /// A row whose residual stands out.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Outlier {
     /// Row index, from 0.
     pub row: usize,
@@ -60,7 +63,8 @@ const NEIGHBOURS: usize = 5;
 /// Below this spread, a nanometre, residuals are the rounding of a file's digits, and nothing stands out.
 const SMALLEST_SPREAD_M: f64 = 1e-9;
 
-/// Rows that stand out from all others or from their neighbours of the same pairing, the worst first.
+/// Rows that stand out from all others or from their neighbours of the same pairing, the worst first: by the median and the median absolute
+/// deviation (F. R. Hampel, J. American Statistical Association 69, 1974). `residuals` has one entry a row.
 pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
     let residuals_m: &[f64] = &residuals.iter().map(|f| f.whitened_m()).collect::<Vec<_>>();
     let stated_m = dataset.stated_sigma_m().unwrap_or_default();
@@ -83,7 +87,7 @@ pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
 }
 
 /// Correlation of each residual with the next one of the same pairing, both less the pairing's mean, in the order of measurement;
-/// `None` for fewer than twenty such neighbours. Independent noise gives `0 ± 1/√n`.
+/// `None` for fewer than twenty such neighbours. Independent noise gives `0 ± 1/√n`. `residuals` has one entry a row.
 pub fn neighbour_correlation(dataset: &Dataset, residuals: &[Residual]) -> Option<f64> {
     let of_pairing = |pairing| dataset.rows_of(pairing).map(|row| residuals[row]).collect();
     let groups: Vec<Vec<Residual>> = dataset.pairings().into_iter().map(of_pairing).collect();

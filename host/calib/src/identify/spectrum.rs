@@ -12,14 +12,15 @@ const ZERO_COLUMN: f64 = 1e-12;
 
 /// Singular value decomposition of a Jacobian whose columns were scaled to unit norm.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Spectrum {
-    /// Descending; as many as there are columns.
+    /// Descending; k, as many as there are columns.
     pub singular_values: Vec<f64>,
     /// How many are above [`RANK_THRESHOLD`] times the largest.
     pub rank: usize,
     /// The divisor of each column.
     pub scales: Vec<f64>,
-    /// Right singular vectors, a column each, in the order of the values.
+    /// Right singular vectors, k × k, a column each, in the order of the values.
     pub right: DMatrix<f64>,
 }
 

@@ -4,6 +4,7 @@ use super::residual::Residual;
 
 /// A straight change of residuals over a measurement, apart from what each pairing is off by as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trend {
     /// From the first to the last length, metres.
     pub change_m: f64,

@@ -6,16 +6,17 @@ use nalgebra::DMatrix;
 use super::observation::Observation;
 use super::spectrum::Spectrum;
 
-/// The linear theory at the solution: `cov = s² (JᵀWJ)⁻¹`, `s² = Σ w f² / (n − r)`.
+/// The linear theory at the solution: `cov = s² (JᵀWJ)⁻¹`, `s² = Σ w f² / (n − r)`, for n lengths, f free parameters and rank r.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Uncertainty {
-    /// One a free parameter, SI: `None` where the data leave the parameter undetermined.
+    /// One a free parameter, in parameter order, SI: `None` where the data leave the parameter undetermined.
     pub std: Vec<Option<f64>>,
     /// Estimated standard deviation s of a length of weight 1, metres; `None` without redundancy.
     pub sigma_m: Option<f64>,
-    /// Singular values of the free columns, scaled.
+    /// Singular values of the f free columns, scaled.
     pub spectrum: Spectrum,
-    /// Covariance of the free parameters, in SI units; only its entries between determined parameters mean anything.
+    /// Covariance of the free parameters, f × f in parameter order, SI units; only its entries between determined parameters mean anything.
     pub covariance: DMatrix<f64>,
 }
 

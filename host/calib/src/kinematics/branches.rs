@@ -26,7 +26,27 @@ impl Thoroughness {
     pub const SOME: Self = Self { starts: 12, patience: 4 };
 }
 
-/// The way from tool poses to joint vectors of one robot.
+/// The way from tool poses to joint vectors of one robot: in closed form for arms with a parallel base and a spherical wrist (M. Brandstötter,
+/// A. Angerer and M. Hofbaur, "An Analytical Solution of the Inverse Kinematics Problem of Industrial Serial Manipulators with an Ortho-parallel
+/// Basis and a Spherical Wrist", Austrian Robotics Workshop 2014), otherwise by steps from random starts.
+///
+/// ```
+/// use ballbar_calib::kinematics::{InverseKinematics, Thoroughness, apart};
+/// use ballbar_calib::{ChaCha8Rng, Kinematics, SeedableRng, designs};
+///
+/// let robot = designs::puma560();
+/// let kinematics = Kinematics::new(&robot.chain);
+/// let base_from_tool = kinematics.base_from_tool(&robot.chain.joint_vector(&[0.3, -0.5, 0.4, 0.2, -0.6, 1.0])?);
+///
+/// let inverse = InverseKinematics::new(&robot);
+/// let found = inverse.branches(&base_from_tool, Thoroughness::ALL, &mut ChaCha8Rng::seed_from_u64(0));
+/// assert!(found.within_limits.len() > 1);
+/// for q in &found.within_limits {
+///     let (off_m, turned_rad) = apart(&kinematics.base_from_tool(q), &base_from_tool);
+///     assert!(off_m < 1e-9 && turned_rad < 1e-9);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct InverseKinematics {
     skeleton: Skeleton,
@@ -36,8 +56,9 @@ pub struct InverseKinematics {
 
 /// What was found for a pose.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Branches {
-    /// Within limits, each joint at the turn nearest to the middle of its range.
+    /// Within limits, each joint at the turn nearest to the middle of its range; radians or metres.
     pub within_limits: Vec<JointVector<f64>>,
     /// How many more there are that the limits forbid.
     pub beyond_limits: usize,
@@ -49,7 +70,7 @@ impl InverseKinematics {
         Self::within(robot, robot.limits.clone())
     }
 
-    /// Prepares a robot with other limits than its file's.
+    /// Prepares a robot with other limits than its own, one entry a joint, radians or metres.
     pub fn within(robot: &Robot, limits: Vec<JointLimits>) -> Self {
         let skeleton = Skeleton::new(&robot.chain);
         Self { closed: Opw::recognise(&skeleton), limits, skeleton }
@@ -65,7 +86,7 @@ impl InverseKinematics {
         &self.skeleton
     }
 
-    /// Joint vectors that bring the tool to a pose.
+    /// Joint vectors that bring the tool to a pose: all of them in closed form, otherwise those that `effort` finds.
     pub fn branches(&self, base_from_tool: &Pose<f64>, effort: Thoroughness, rng: &mut ChaCha8Rng) -> Branches {
         match &self.closed {
             Some(closed) => self.sorted(closed.solve(base_from_tool)),

@@ -25,6 +25,7 @@ pub struct Compensator {
 
 /// What to command for one target. Differences are metres and radians, as the calibrated robot predicts them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Compensation {
     /// Joints to command, radians or metres.
     pub q: JointVector<f64>,
@@ -43,6 +44,7 @@ pub struct Compensation {
 
 /// How a target is given.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Goal {
     /// The pose that the controller's model has at these joints, radians or metres.
     Joints(JointVector<f64>),
@@ -72,6 +74,7 @@ fn range(kind: JointKind, limits: &JointLimits) -> String {
 
 /// Why a target has no command.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Unreached {
     /// The controller's own model does not get there, or only beyond limits.
     ByNominal,

@@ -31,6 +31,7 @@ const TOUCHING_M: f64 = 1e-9;
 
 /// Which of the two tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Convention {
     /// Denavit's and Hartenberg's.
     Standard,
@@ -40,6 +41,7 @@ pub enum Convention {
 
 /// A row; its joint's encoder output times `scale` is added to theta (revolute) or d (prismatic).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DhRow {
     /// Revolute or prismatic.
     pub kind: JointKind,
@@ -57,6 +59,7 @@ pub struct DhRow {
 
 /// Two axes whose common normal is far away.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NearlyParallel {
     /// Number of the first of the two joints, from 1.
     pub joint: usize,
@@ -64,8 +67,10 @@ pub struct NearlyParallel {
     pub angle_rad: f64,
 }
 
+/// A table of J. Denavit and R. S. Hartenberg (ASME J. Applied Mechanics 22, 1955) for a whole chain:
 /// `base_from_first · row 1 · … · row J · last_from_tool`.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DhTable {
     /// How the rows are read.
     pub convention: Convention,
@@ -75,7 +80,7 @@ pub struct DhTable {
     pub rows: Vec<DhRow>,
     /// What stands behind the last row.
     pub last_from_tool: Pose<f64>,
-    /// Where the values run away.
+    /// Where the values run away: such axes are better described otherwise (S. A. Hayati, IEEE CDC 1983).
     pub nearly_parallel: Vec<NearlyParallel>,
 }
 

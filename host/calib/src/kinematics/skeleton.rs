@@ -65,17 +65,17 @@ impl Posture {
         &self.axes[..self.joints]
     }
 
-    /// Where link `i` starts: on the axis of the joint before it, behind that joint's motion.
+    /// Where link `link` starts, from 0: on the axis of the joint before it, behind that joint's motion.
     pub fn start_m(&self, link: usize) -> Vector3<f64> {
         self.starts_m[link]
     }
 
-    /// Where link `i` turns away from the axis of the joint before it: its translation's z part from its start.
+    /// Where link `link` turns away from the axis of the joint before it: its translation's z part from its start.
     pub fn corner_m(&self, link: usize) -> Vector3<f64> {
         self.corners_m[link]
     }
 
-    /// Where link `i` ends: at the origin of the joint behind it, before that joint's motion, or of the tool.
+    /// Where link `link` ends: at the origin of the joint behind it, before that joint's motion, or of the tool.
     pub fn end_m(&self, link: usize) -> Vector3<f64> {
         self.ends_m[link]
     }
@@ -109,7 +109,10 @@ impl Skeleton {
         &self.encoders
     }
 
-    /// Translation of link `i` in the frame before it, metres.
+    /// Translation of link `link`, from 0, in the frame before it, metres.
+    ///
+    /// # Panics
+    /// When there is no such link.
     pub fn translation_m(&self, link: usize) -> Vector3<f64> {
         self.links[link].translation_m
     }

@@ -3,14 +3,15 @@
 use std::collections::HashSet;
 use std::fmt;
 
-use ballbar::Measurement;
+use ballbar::{JointVector, Measurement};
 use thiserror::Error;
 
 use super::rig::{PairingId, Rig};
 use super::robot::Robot;
 
-/// One measured length, and where the robot stood.
+/// One measured length, and where the robot stood. [`PoseRow::new`] makes one from numbers.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseRow {
     /// Which chuck and sphere the bar joined.
     pub pairing: PairingId,
@@ -36,6 +37,7 @@ pub struct PoseRow {
 
 /// How the length changed while it was measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Motion {
     /// How fast it grew, metres per second.
     pub rate_m_s: f64,
@@ -43,17 +45,70 @@ pub struct Motion {
     pub removed_lag_s: f64,
 }
 
-/// Measured poses of one robot with one rig, in the order of their files. Rows are numbered from 1.
+/// Why numbers are no measured length.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// The rig has no such chuck or sphere.
+    #[error("chuck {} and sphere {} (from 0), which the rig does not have", .0.chuck, .0.sphere)]
+    NoSuchPairing(PairingId),
+    /// A joint value is infinite or not a number.
+    #[error("joint {joint} is not at a finite number")]
+    NotFinite {
+        /// Number of the joint, from 1.
+        joint: usize,
+    },
+    /// The length is not a finite number above zero.
+    #[error("a length of {length_m} m, expected a finite number above zero")]
+    Length {
+        /// What was given, metres.
+        length_m: f64,
+    },
+}
+
+impl PoseRow {
+    /// A length `length_m` (metres) that the bar had between a chuck and a sphere of `rig`, with the joints at `q`
+    /// ([`ballbar::Chain::joint_vector`]; radians or metres). Nothing else is known of it; what is, is set in its field, such as
+    /// [`PoseRow::sigma_m`]. [`Dataset::new`] numbers and weighs it.
+    ///
+    /// # Errors
+    /// [`PoseError`] when the rig has no such pairing, or a number is none that can be measured.
+    pub fn new(rig: &Rig, pairing: PairingId, q: JointVector<f64>, length_m: f64) -> Result<Self, PoseError> {
+        if !rig.has(pairing) {
+            return Err(PoseError::NoSuchPairing(pairing));
+        }
+        if let Some(i) = q.as_array().iter().position(|q| !q.is_finite()) {
+            return Err(PoseError::NotFinite { joint: i + 1 });
+        }
+        if !(length_m.is_finite() && length_m > 0.0) {
+            return Err(PoseError::Length { length_m });
+        }
+        let measurement = Measurement { pairing: rig.pairing(pairing), q, length_m, weight: 1.0 };
+        Ok(Self::of(pairing, measurement))
+    }
+
+    /// A measurement with nothing else known of it.
+    pub(crate) fn of(pairing: PairingId, measurement: Measurement<f64>) -> Self {
+        Self { pairing, measurement, sigma_m: None, set: None, t_s: None, bar_m: None, motion: None, file: 0, line: 0, number: 0 }
+    }
+}
+
+/// Measured poses of one robot with one rig, in the order in which they were measured. [`Dataset::new`] makes one from rows, which it numbers
+/// from 1.
+///
+/// "Files" are wherever rows come from: a name for messages, no more.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "super::stored::DatasetParts"))]
 pub struct Dataset {
     /// The rows.
     pub rows: Vec<PoseRow>,
-    /// Names of the files.
+    /// Names of the files, or of whatever else the rows come from.
     pub files: Vec<String>,
 }
 
 /// Something about a row that may be a mistake but is no reason to refuse it.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum RowWarning {
     /// A joint stood beyond its limits.
     BeyondLimits {
@@ -83,7 +138,7 @@ impl fmt::Display for RowWarning {
 pub struct MixedSigma;
 
 impl Dataset {
-    /// Of measurements without a file of their own.
+    /// Of rows from one place, `name`: numbered in their order, and weighed by their deviations, where they state these.
     ///
     /// # Errors
     /// [`MixedSigma`] when only some rows have a deviation.
@@ -93,7 +148,7 @@ impl Dataset {
         Ok(dataset)
     }
 
-    /// Appends rows from one place, numbers them, and weighs all rows anew.
+    /// Appends rows from one place, numbers them, and weighs all rows anew. Rows without a line get their position, from 1.
     ///
     /// # Errors
     /// [`MixedSigma`]; the dataset is then as it was.
@@ -106,8 +161,11 @@ impl Dataset {
         let (file, before) = (self.files.len(), self.rows.len());
         self.files.push(name.to_owned());
         self.rows.extend(rows);
-        for (number, row) in (before + 1..).zip(&mut self.rows[before..]) {
-            (row.file, row.number) = (file, number);
+        for (i, row) in self.rows[before..].iter_mut().enumerate() {
+            (row.file, row.number) = (file, before + i + 1);
+            if row.line == 0 {
+                row.line = i + 1;
+            }
         }
         self.weigh();
         Ok(())
@@ -133,6 +191,7 @@ impl Dataset {
             row.measurement.weight = inverse_variance(row) / mean;
         }
     }
+
     /// The measurements alone.
     pub fn measurements(&self) -> Vec<Measurement<f64>> {
         self.rows.iter().map(|row| row.measurement).collect()
@@ -171,7 +230,10 @@ impl Dataset {
         (0..self.rows.len()).filter(move |&row| self.rows[row].pairing == pairing)
     }
 
-    /// `poses.csv:12`, for row index `row`.
+    /// `name:12`, the file's name and the line there, for row index `row`.
+    ///
+    /// # Panics
+    /// When there is no such row, or its file is none of [`Dataset::files`].
     pub fn place(&self, row: usize) -> String {
         format!("{}:{}", self.files[self.rows[row].file], self.rows[row].line)
     }
@@ -196,5 +258,30 @@ impl Dataset {
             }
         }
         warnings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::NamedPoint;
+
+    #[test]
+    fn a_row_is_a_length_that_the_rig_can_have() {
+        let end = |name| vec![NamedPoint::new(name, [0.0; 3])];
+        let rig = Rig::new(end("A"), end("1"), None).unwrap();
+        let only = PairingId { chuck: 0, sphere: 0 };
+        let row = |pairing, q: f64, length_m| {
+            let mut at = JointVector::zero();
+            at.as_array_mut()[1] = q;
+            PoseRow::new(&rig, pairing, at, length_m)
+        };
+        assert_eq!(row(only, 0.5, 0.46).unwrap().measurement.length_m, 0.46);
+        let other = PairingId { chuck: 0, sphere: 1 };
+        assert_eq!(row(other, 0.5, 0.46).unwrap_err(), PoseError::NoSuchPairing(other));
+        assert_eq!(row(only, f64::NAN, 0.46).unwrap_err(), PoseError::NotFinite { joint: 2 });
+        assert_eq!(row(only, 0.5, 0.0).unwrap_err(), PoseError::Length { length_m: 0.0 });
+        let rows = vec![row(only, 0.5, 0.46).unwrap(), row(only, 0.6, 0.47).unwrap()];
+        assert_eq!(Dataset::new("by hand", rows).unwrap().place(1), "by hand:2");
     }
 }

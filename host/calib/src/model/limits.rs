@@ -9,6 +9,7 @@ use crate::units::{ScreenUnit, tidy};
 
 /// Limits of a joint's encoder output q, radians or metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct JointLimits {
     /// Lower limit.
     pub min: f64,
@@ -17,6 +18,11 @@ pub struct JointLimits {
 }
 
 impl JointLimits {
+    /// Whether there is anything between them.
+    pub(super) fn are_a_range(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite() && self.min < self.max
+    }
+
     /// Whether `q` lies within, limits included.
     pub fn contain(&self, q: f64) -> bool {
         (self.min..=self.max).contains(&q)
@@ -25,6 +31,7 @@ impl JointLimits {
 
 /// A joint that stands beyond its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BeyondLimits {
     /// Number of the joint, from 1.
     pub joint: usize,

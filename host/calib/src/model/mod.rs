@@ -6,10 +6,12 @@ mod limits;
 mod rig;
 mod robot;
 mod solids;
+#[cfg(feature = "serde")]
+mod stored;
 
 pub use calibration::{Calibration, CalibrationVerdict};
-pub use dataset::{Dataset, MixedSigma, Motion, PoseRow, RowWarning};
+pub use dataset::{Dataset, MixedSigma, Motion, PoseError, PoseRow, RowWarning};
 pub use limits::{BeyondLimits, JointLimits};
-pub use rig::{Bar, NamedPoint, PairingId, Rig};
-pub use robot::{EncoderFacts, Robot};
+pub use rig::{Bar, End, NamedPoint, PairingId, Rig, RigError};
+pub use robot::{EncoderFacts, Robot, RobotError};
 pub use solids::Solids;

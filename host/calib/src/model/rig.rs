@@ -1,11 +1,15 @@
 //! A rig: chucks on the table, spheres on the tool, the bar.
 
+use std::fmt;
+
 use ballbar::{Pairing, Vector3};
+use thiserror::Error;
 
 use super::solids::Solids;
 
 /// A chuck (base frame) or a sphere (tool frame).
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NamedPoint {
     /// Its name in poses and pairings.
     pub name: String,
@@ -13,8 +17,16 @@ pub struct NamedPoint {
     pub position_m: Vector3<f64>,
 }
 
+impl NamedPoint {
+    /// A chuck or a sphere at `position_m`, `(x, y, z)` in metres.
+    pub fn new(name: impl Into<String>, position_m: [f64; 3]) -> Self {
+        Self { name: name.into(), position_m: Vector3::from(position_m) }
+    }
+}
+
 /// Indices of a chuck and a sphere of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PairingId {
     /// Index into [`Rig::chucks`].
     pub chuck: usize,
@@ -24,6 +36,7 @@ pub struct PairingId {
 
 /// The telescoping bar.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bar {
     /// Lengths at mid travel, one an extension rod, metres.
     pub lengths_m: Vec<f64>,
@@ -38,8 +51,9 @@ impl Bar {
     }
 }
 
-/// Where the bar can be attached.
-#[derive(Clone, Debug)]
+/// Where the bar can be attached. [`Rig::new`] makes one from numbers.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "super::stored::RigParts"))]
 pub struct Rig {
     /// Chucks on the table, base frame.
     pub chucks: Vec<NamedPoint>,
@@ -51,13 +65,88 @@ pub struct Rig {
     pub solids: Solids,
 }
 
+/// Which end of the bar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// On the table.
+    Chuck,
+    /// On the tool.
+    Sphere,
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Chuck => "chuck",
+            Self::Sphere => "sphere",
+        })
+    }
+}
+
+/// Why numbers are no rig.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum RigError {
+    /// There is no chuck, or no sphere.
+    #[error("no {0}, expected one at least")]
+    Empty(End),
+    /// Two chucks, or two spheres, have one name.
+    #[error("two {end}s are called `{name}`")]
+    Duplicate {
+        /// Which end of the bar.
+        end: End,
+        /// Their name.
+        name: String,
+    },
+    /// A centre is infinite or not a number.
+    #[error("{end} `{name}` is not at finite numbers")]
+    NotFinite {
+        /// Which end of the bar.
+        end: End,
+        /// The name of the chuck or sphere.
+        name: String,
+    },
+    /// The bar has no length, or its travel or a length is not above zero.
+    #[error("the bar's travel and lengths have to be finite and above zero, and a length there has to be")]
+    Bar,
+}
+
 impl Rig {
+    /// Chucks in the base frame, spheres in the tool frame, and the bar where it is known: planning and simulation keep to its travel. The
+    /// solids are the usual ones; set [`Rig::solids`] where they are not.
+    ///
+    /// # Errors
+    /// [`RigError`] when there is no chuck or no sphere, when a name stands twice, or when a number is none that a rig can have.
+    pub fn new(chucks: Vec<NamedPoint>, spheres: Vec<NamedPoint>, bar: Option<Bar>) -> Result<Self, RigError> {
+        Self { chucks, spheres, bar, solids: Solids::default() }.checked()
+    }
+
+    /// What [`Rig::new`] promises of a rig, whoever has put it together.
+    pub(super) fn checked(self) -> Result<Self, RigError> {
+        check_points(End::Chuck, &self.chucks)?;
+        check_points(End::Sphere, &self.spheres)?;
+        let is_size = |size_m: &f64| size_m.is_finite() && *size_m > 0.0;
+        let is_bar = |bar: &Bar| !bar.lengths_m.is_empty() && bar.lengths_m.iter().chain([&bar.travel_m]).all(is_size);
+        if self.bar.as_ref().is_none_or(is_bar) { Ok(self) } else { Err(RigError::Bar) }
+    }
+
     /// Centres of the two ends of a pairing.
+    ///
+    /// # Panics
+    /// When `id` is of another rig, and this one has no such chuck or sphere. [`Rig::has`] tells.
     pub fn pairing(&self, id: PairingId) -> Pairing<f64> {
         Pairing { chuck_base_m: self.chucks[id.chuck].position_m, sphere_tool_m: self.spheres[id.sphere].position_m }
     }
 
+    /// Whether a pairing's chuck and sphere are of this rig.
+    pub fn has(&self, id: PairingId) -> bool {
+        id.chuck < self.chucks.len() && id.sphere < self.spheres.len()
+    }
+
     /// `A:1`.
+    ///
+    /// # Panics
+    /// As [`Rig::pairing`].
     pub fn pairing_name(&self, id: PairingId) -> String {
         format!("{}:{}", self.chucks[id.chuck].name, self.spheres[id.sphere].name)
     }
@@ -76,5 +165,53 @@ impl Rig {
     /// Index of a sphere of that name.
     pub fn sphere(&self, name: &str) -> Option<usize> {
         self.spheres.iter().position(|sphere| sphere.name == name)
+    }
+}
+
+fn check_points(end: End, points: &[NamedPoint]) -> Result<(), RigError> {
+    if points.is_empty() {
+        return Err(RigError::Empty(end));
+    }
+    for (i, NamedPoint { name, position_m }) in points.iter().enumerate() {
+        if points[..i].iter().any(|other| other.name == *name) {
+            return Err(RigError::Duplicate { end, name: name.clone() });
+        }
+        if !position_m.iter().all(|x| x.is_finite()) {
+            return Err(RigError::NotFinite { end, name: name.clone() });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(positions_m: &[(&str, f64)]) -> Vec<NamedPoint> {
+        positions_m.iter().map(|&(name, x_m)| NamedPoint::new(name, [x_m, 0.0, 0.0])).collect()
+    }
+
+    #[test]
+    fn a_rig_has_ends_with_names_of_their_own_at_finite_places() {
+        let good = || points(&[("A", 0.0), ("B", 0.1)]);
+        let rig = Rig::new(good(), good(), None).unwrap();
+        assert_eq!(rig.all_pairings().len(), 4);
+        assert!(rig.has(PairingId { chuck: 1, sphere: 1 }) && !rig.has(PairingId { chuck: 1, sphere: 2 }));
+        assert_eq!(Rig::new(good(), vec![], None), Err(RigError::Empty(End::Sphere)));
+        let twice = RigError::Duplicate { end: End::Chuck, name: "A".to_owned() };
+        assert_eq!(Rig::new(points(&[("A", 0.0), ("A", 0.1)]), good(), None), Err(twice));
+        let nowhere = RigError::NotFinite { end: End::Sphere, name: "B".to_owned() };
+        assert_eq!(Rig::new(good(), points(&[("A", 0.0), ("B", f64::NAN)]), None), Err(nowhere));
+    }
+
+    #[test]
+    fn a_bar_has_a_length_and_travel() {
+        let rig = |lengths_m: &[f64], travel_m| {
+            Rig::new(points(&[("A", 0.0)]), points(&[("1", 0.0)]), Some(Bar { lengths_m: lengths_m.to_vec(), travel_m }))
+        };
+        assert!(rig(&[0.46, 0.61], 0.075).is_ok());
+        for (lengths_m, travel_m) in [(&[][..], 0.075), (&[0.46, 0.0], 0.075), (&[0.46], f64::NAN), (&[f64::INFINITY], 0.075)] {
+            assert_eq!(rig(lengths_m, travel_m), Err(RigError::Bar));
+        }
     }
 }

@@ -1,12 +1,14 @@
 //! A robot: a chain, its limits and encoders, and when and from what it was calibrated.
 
 use ballbar::{Chain, Coupling, Encoder};
+use thiserror::Error;
 
 use super::calibration::{Calibration, CalibrationVerdict};
 use super::limits::JointLimits;
 
-/// A robot as it is believed to be.
+/// A robot as it is believed to be. [`Robot::new`] makes one from numbers.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "super::stored::RobotParts"))]
 pub struct Robot {
     /// What people call it.
     pub name: String,
@@ -24,6 +26,7 @@ pub struct Robot {
 
 /// How a joint's encoder counts.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EncoderFacts {
     /// Counts per radian or metre, and from index to index; `None` where the file does not say.
     pub encoder: Option<Encoder<f64>>,
@@ -31,7 +34,68 @@ pub struct EncoderFacts {
     pub couplings: Vec<Coupling<f64>>,
 }
 
+impl EncoderFacts {
+    /// Of an encoder that nothing is known of: joint values are taken as they come.
+    pub const UNKNOWN: Self = Self { encoder: None, couplings: Vec::new() };
+}
+
+/// Why numbers are no robot.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum RobotError {
+    /// Not every joint has limits, or more than the joints have.
+    #[error("limits of {found} joints, expected {expected}")]
+    LimitCount {
+        /// Limits given.
+        found: usize,
+        /// Joints of the chain.
+        expected: usize,
+    },
+    /// A joint's range is empty, or one of its ends is no finite number.
+    #[error("joint {joint} cannot be limited to {} … {}, expected finite numbers and the lower one first", .limits.min, .limits.max)]
+    Limits {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// What was given, radians or metres.
+        limits: JointLimits,
+    },
+    /// What is known of encoders is not of these joints.
+    #[error("encoders of {found} joints, expected {expected}")]
+    EncoderCount {
+        /// Encoders given.
+        found: usize,
+        /// Joints of the chain.
+        expected: usize,
+    },
+}
+
 impl Robot {
+    /// A design: `limits` has one entry a joint, radians or metres as the joint is. Its `source` is its name, and nothing is known of its
+    /// encoders.
+    ///
+    /// # Errors
+    /// [`RobotError`] when limits are not those of the chain's joints, or not a range.
+    pub fn new(name: impl Into<String>, chain: Chain<f64>, limits: Vec<JointLimits>) -> Result<Self, RobotError> {
+        let name = name.into();
+        let encoders = vec![EncoderFacts::UNKNOWN; chain.joints()];
+        Self { source: name.clone(), name, chain, limits, encoders, calibration: None }.checked()
+    }
+
+    /// What [`Robot::new`] promises of a robot, whoever has put it together.
+    pub(super) fn checked(self) -> Result<Self, RobotError> {
+        let expected = self.chain.joints();
+        if self.limits.len() != expected {
+            return Err(RobotError::LimitCount { found: self.limits.len(), expected });
+        }
+        if self.encoders.len() != expected {
+            return Err(RobotError::EncoderCount { found: self.encoders.len(), expected });
+        }
+        match self.limits.iter().position(|limits| !limits.are_a_range()) {
+            Some(i) => Err(RobotError::Limits { joint: i + 1, limits: self.limits[i] }),
+            None => Ok(self),
+        }
+    }
+
     /// What the fit behind this robot was found to be; `None` for a design, and for a file that does not say.
     pub fn verdict(&self) -> Option<CalibrationVerdict> {
         self.calibration.as_ref().and_then(|calibration| calibration.verdict)
@@ -45,5 +109,29 @@ impl Robot {
             (Some(_), None) => "fitted, but not found to be calibrated",
             (None, None) => "design, not calibrated",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ballbar::JointKind;
+
+    fn chain() -> Chain<f64> {
+        Chain::new(&[JointKind::Revolute, JointKind::Prismatic], &[0.0; 22]).unwrap()
+    }
+
+    #[test]
+    fn each_joint_has_limits_that_are_a_range() {
+        let good = JointLimits { min: -1.0, max: 1.0 };
+        let robot = |limits: &[JointLimits]| Robot::new("arm", chain(), limits.to_vec());
+        let made = robot(&[good, good]).unwrap();
+        assert_eq!((made.source.as_str(), made.encoders.len(), made.standing()), ("arm", 2, "design, not calibrated"));
+        assert_eq!(robot(&[good]).unwrap_err(), RobotError::LimitCount { found: 1, expected: 2 });
+        for (min, max) in [(1.0, -1.0), (1.0, 1.0), (f64::NEG_INFINITY, 1.0), (0.0, f64::INFINITY)] {
+            let limits = JointLimits { min, max };
+            assert_eq!(robot(&[good, limits]).unwrap_err(), RobotError::Limits { joint: 2, limits });
+        }
+        assert!(robot(&[JointLimits { min: f64::NAN, max: 1.0 }, good]).is_err());
     }
 }

@@ -3,6 +3,7 @@
 /// Sizes of what stands around the bar, metres. Neither robots nor rigs describe solids; the defaults are plain stand-ins, a little larger than
 /// what is usual.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Solids {
     /// Of the bar, a capsule from chuck to sphere.
     pub bar_radius_m: f64,

@@ -7,6 +7,7 @@ use super::shell::ShellRoads;
 
 /// What keeps most points of a shell from being measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Cause {
     /// The plate with the spheres faces so far away from the axis of the last joint, radians: its spheres are beside the last link.
     TurnedPlate(f64),

@@ -14,6 +14,7 @@ use crate::model::{PairingId, Rig, Robot};
 
 /// What has to be left at every pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Margins {
     /// To the limits of revolute joints, radians.
     pub limit_rad: f64,
@@ -35,6 +36,7 @@ impl Default for Margins {
 
 /// How fast the robot goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pace {
     /// Of revolute joints, radians per second.
     pub turn_rad_s: f64,
@@ -61,10 +63,13 @@ pub fn plausible_deviation(unit: ballbar::ParameterUnit) -> f64 {
 
 /// How far a pose is from the joints' limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LimitMargin {
     /// Of the revolute joint nearest to a limit, radians; infinite without one.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub turn_rad: f64,
     /// Of the prismatic joint nearest to a limit, metres; infinite without one.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub slide_m: f64,
 }
 
@@ -97,7 +102,7 @@ pub struct Cell<'a> {
 }
 
 impl<'a> Cell<'a> {
-    /// Prepares a robot at its rig.
+    /// Prepares a robot at its rig, with a bar that travels `travel_m` from end to end.
     ///
     /// # Errors
     /// [`FixturesOverlap`] when the rig cannot be as it is described.

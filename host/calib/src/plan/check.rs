@@ -11,24 +11,31 @@ use crate::plan::{PlanRow, RowKind};
 
 /// Least margins over all rows and fine steps between them.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Found {
     /// Joint vectors looked at, rows among them.
     pub steps: usize,
     /// To the joints' limits, revolute joints, radians; below zero beyond them.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub limit_rad: f64,
     /// To the joints' limits, prismatic joints, metres.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub limit_m: f64,
     /// To the ends of the bar's travel, by the nominal robot, metres.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub travel_m: f64,
     /// To the ends of the bar's travel at the rows, by the worst of many plausible robots, metres.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub plausible_travel_m: f64,
     /// How many plausible robots that was.
     pub plausible_robots: usize,
     /// Between any two solids, metres.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub clearance_m: f64,
     /// Which these are.
     pub nearest: Contact,
     /// Smallest singular value at measured poses.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub singularity: f64,
     /// Row index before which the clearance is least.
     pub nearest_row: usize,

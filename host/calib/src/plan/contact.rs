@@ -4,6 +4,7 @@ use std::fmt;
 
 /// Two things that come near one another. Links are counted from 1, as in the robot's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Contact {
     /// Bar and table.
     BarTable,
@@ -52,6 +53,7 @@ impl fmt::Display for Contact {
 
 /// The two things that are nearest to one another, surface to surface; below zero they meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nearest {
     /// Gap between their surfaces, metres.
     pub gap_m: f64,

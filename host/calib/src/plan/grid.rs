@@ -6,6 +6,7 @@ use ballbar::Vector3;
 
 /// Which circles cross.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Grid {
     /// Elevations of the bar above the table, radians, ascending.
     pub latitudes_rad: Vec<f64>,
@@ -15,6 +16,7 @@ pub struct Grid {
 
 /// One point of the hemisphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Crossing {
     /// Elevation of the bar, radians.
     pub latitude_rad: f64,

@@ -9,7 +9,8 @@ use super::information::information;
 const PASSES: usize = 20;
 
 /// Indices, ascending, of `count` rows whose `JᵀJ` has a determinant that no exchange of one row raises. `rows` are over independent
-/// columns, scaled alike. Fewer when there are fewer rows.
+/// columns, scaled alike. Fewer when there are fewer rows. By exchange, after V. V. Fedorov (1972), one row at a time as R. D. Cook and
+/// C. J. Nachtsheim have it (Technometrics 22(3), 1980): a local optimum.
 pub fn d_optimal(rows: &[Vec<f64>], count: usize) -> Vec<usize> {
     let columns = rows.first().map_or(0, Vec::len);
     let all = DMatrix::from_fn(columns, rows.len(), |column, row| rows[row][column]);

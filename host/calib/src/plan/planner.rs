@@ -20,12 +20,13 @@ use super::progress::{Ongoing, Stage, Tell};
 use super::quality::{Expectation, Quality, Unfit};
 use super::shell::{ShellRoads, Stop, TOURS};
 use super::transfer;
-use crate::model::{Dataset, PairingId, PoseRow, Rig, Robot};
-use crate::plan::{PlanRow, RowKind, RowMargins};
+use crate::model::{Bar, Dataset, PairingId, PoseRow, Rig, Robot};
+use crate::plan::{BarAt, PlanRow, RowKind, RowMargins};
 use crate::units::{mm_from_m, tidy};
 
 /// What to plan.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlanOptions {
     /// Pairings, in the order in which they are measured.
     pub pairings: Vec<PairingId>,
@@ -45,6 +46,25 @@ pub struct PlanOptions {
     pub pace: Pace,
     /// The same seed gives the same plan.
     pub seed: u64,
+}
+
+impl PlanOptions {
+    /// So many poses on each shell (90 are usual), for each of the bar's lengths, with the usual latitudes of 15° to 75°, margins and pace.
+    /// `pairings` are of the rig that is planned for ([`Rig::all_pairings`]); what is to be otherwise is set in its field.
+    pub fn new(pairings: Vec<PairingId>, bar: &Bar, poses_per_shell: usize) -> Self {
+        const LATITUDES_DEG: [f64; 5] = [15.0, 30.0, 45.0, 60.0, 75.0];
+        Self {
+            pairings,
+            bars_m: bar.lengths_m.clone(),
+            travel_m: bar.travel_m,
+            grid: Grid::of(&LATITUDES_DEG, poses_per_shell),
+            poses_per_shell,
+            optimal: None,
+            margins: Margins::default(),
+            pace: Pace::default(),
+            seed: 0,
+        }
+    }
 }
 
 /// Why there is no plan.
@@ -92,6 +112,7 @@ fn counted(hindrances: &[(Hindrance, usize)]) -> String {
 
 /// One shell of a plan.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShellSummary {
     /// Which chuck and sphere.
     pub pairing: PairingId,
@@ -115,6 +136,7 @@ pub struct ShellSummary {
 
 /// Chosen poses beside the latitude-longitude grid.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Comparison {
     /// Poses to choose from.
     pub pool: usize,
@@ -128,6 +150,7 @@ pub struct Comparison {
 
 /// Poses and via points in order.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plan {
     /// The rows; the robot goes from each to the next by joint interpolation.
     pub rows: Vec<PlanRow>,
@@ -151,22 +174,15 @@ impl Plan {
     /// The poses to measure, as if each had been measured without an error.
     pub fn as_dataset(&self, rig: &Rig) -> Dataset {
         let measured = self.rows.iter().filter(|row| row.kind == RowKind::Measure);
-        let pose = |(i, row): (usize, &PlanRow)| PoseRow {
-            pairing: row.pairing,
-            measurement: Measurement {
+        let pose = |(i, row): (usize, &PlanRow)| {
+            let measurement = Measurement {
                 pairing: rig.pairing(row.pairing),
                 q: row.q,
                 length_m: row.bar.map_or(row.bar_m, |bar| bar.length_m),
                 weight: 1.0,
-            },
-            sigma_m: None,
-            set: None,
-            t_s: None,
-            bar_m: Some(row.bar_m),
-            motion: None,
-            file: 0,
-            line: i + 1,
-            number: i + 1,
+            };
+            let number = i + 1;
+            PoseRow { bar_m: Some(row.bar_m), line: number, number, ..PoseRow::of(row.pairing, measurement) }
         };
         Dataset { rows: measured.enumerate().map(pose).collect(), files: Vec::new() }
     }
@@ -174,8 +190,30 @@ impl Plan {
 
 /// Plans, and tells of all stages but that of [`super::check()`].
 ///
+/// ```
+/// use ballbar_calib::designs;
+/// use ballbar_calib::model::PairingId;
+/// use ballbar_calib::plan::{Cell, CheckedPlan, PlanOptions, plan};
+///
+/// let (robot, rig) = (designs::puma560(), designs::triangles());
+/// let bar = rig.bar.as_ref().ok_or("no bar")?;
+/// let pairings = vec![PairingId { chuck: 0, sphere: 0 }];
+/// let options = PlanOptions { bars_m: vec![0.46], ..PlanOptions::new(pairings, bar, 10) };
+/// let plan = plan(&robot, &rig, &options, &|_| ())?;
+/// assert!(plan.shells[0].measured > 5);
+///
+/// // What moves a robot takes a plan that was looked at in fine steps.
+/// let cell = Cell::new(&robot, &rig, options.travel_m, options.margins, options.pace)?;
+/// let checked = CheckedPlan::new(&cell, &plan.rows)?;
+/// assert_eq!(checked.rows().len(), plan.rows.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`PlanError`] when fixtures overlap, a shell cannot be reached, or `optimal` asks for what cannot be.
+///
+/// # Panics
+/// When a pairing is none of the rig's.
 pub fn plan(robot: &Robot, rig: &Rig, options: &PlanOptions, tell: &Tell<'_>) -> Result<Plan, PlanError> {
     let cell = Cell::new(robot, rig, options.travel_m, options.margins, options.pace)?;
     let mut roads = all_roads(&cell, options, tell);
@@ -358,11 +396,7 @@ fn row(cell: &Cell<'_>, shell: &Shell, kind: RowKind, q: &JointVector<f64>, is_a
         pairing: shell.id,
         bar_m: shell.bar_m,
         q: *q,
-        bar: is_attached.then(|| crate::plan::BarAt {
-            latitude_rad: (bar_m.z / bar_m.norm()).asin(),
-            longitude_rad: bar_m.y.atan2(bar_m.x).rem_euclid(std::f64::consts::TAU),
-            length_m: bar_m.norm(),
-        }),
+        bar: is_attached.then(|| BarAt::along(&bar_m)),
         margins: Some(RowMargins {
             travel_m: is_attached.then(|| cell.travel_margin_m(q, &shell.pairing, shell.bar_m)),
             clearance_m: nearest.gap_m,

@@ -18,6 +18,7 @@ use crate::model::PairingId;
 
 /// Why a point is not measured, in the order in which postures are tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Hindrance {
     /// No tool orientation tried brings the sphere there.
     OutOfReach,

@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// What is done one after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Stage {
     /// Postures at the points of every shell, and paths between them; counted in points.
     Postures,
@@ -41,6 +42,7 @@ impl fmt::Display for Stage {
 
 /// How much of a stage is done. Stages come in their order; within one `total` stays and `done` grows to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Progress {
     /// Which.
     pub stage: Stage,

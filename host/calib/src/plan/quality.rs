@@ -14,6 +14,7 @@ use crate::model::JointLimits;
 /// Indices of observability of a set of poses, from the singular values `σ` of its Jacobian over an independent subset of parameters,
 /// each column times the parameter's plausible deviation: millimetres of length a deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Quality {
     /// Poses.
     pub poses: usize,
@@ -35,12 +36,14 @@ pub struct Quality {
 
 /// Which parameters a set of poses tells, and how independently.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Expectation {
     /// Parameters that can be told.
     pub rank: usize,
     /// The most that the chain has (eq. 1).
     pub independent: usize,
     /// Largest over smallest singular value of the identified columns, scaled to unit norm.
+    #[cfg_attr(feature = "serde", serde(with = "crate::stored::infinite_as_none"))]
     pub condition: f64,
     /// Indices of an independent subset, ascending.
     pub identified: Vec<usize>,
@@ -102,6 +105,7 @@ impl Quality {
 
 /// Why no fit to some poses could be trusted, whatever is measured at them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Unfit {
     /// No more poses than parameters: lengths can be met exactly, noise and all.
     FewPoses {

@@ -35,8 +35,9 @@ pub struct Shells<'a> {
 
 /// A pose on a shell and the length measured there.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShellPose {
-    /// As a row of a file of poses.
+    /// As a measured length.
     pub row: PoseRow,
     /// Elevation of the bar above the table as planned, radians.
     pub latitude_rad: f64,
@@ -73,8 +74,28 @@ impl Shells<'_> {
     /// Points are spread evenly over the area of the hemisphere. The arm's posture is what a random start within the joint
     /// limits leads to, so that wrists and elbows vary as the fit needs them to.
     ///
+    /// ```
+    /// use ballbar_calib::designs;
+    /// use ballbar_calib::model::Dataset;
+    /// use ballbar_calib::simulate::Shells;
+    ///
+    /// let (robot, rig) = (designs::puma560(), designs::triangles());
+    /// let pairings = rig.all_pairings();
+    /// let shells = Shells {
+    ///     planned_with: &robot, truth: &robot, rig: &rig, pairings: &pairings, bar_m: 0.46, per_pairing: 5, sigma_m: 84e-6, seed: 1,
+    /// };
+    /// let poses = shells.simulate(|| ())?;
+    /// assert_eq!(poses.len(), 9 * 5);
+    /// let dataset = Dataset::new("simulated", poses.into_iter().map(|pose| pose.row).collect())?;
+    /// assert!(dataset.rows.iter().all(|row| (row.measurement.length_m - 0.46).abs() <= 0.0375));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`ShellError::OutOfReach`] when a shell has too few points that the robot reaches.
+    ///
+    /// # Panics
+    /// When a pairing is none of the rig's.
     pub fn simulate(&self, mut on_pose: impl FnMut()) -> Result<Vec<ShellPose>, ShellError> {
         let planned = Skeleton::new(&self.planned_with.chain);
         let truth = Kinematics::new(&self.truth.chain);
@@ -134,16 +155,9 @@ impl Shells<'_> {
         let within_travel = self.rig.bar.as_ref().is_none_or(|bar| (length_m - self.bar_m).abs() <= bar.travel_m / 2.0);
         (within_travel && length_m > 0.0).then(|| ShellPose {
             row: PoseRow {
-                pairing: id,
-                measurement: ballbar::Measurement { pairing, q, length_m, weight: 1.0 },
-                sigma_m: None,
                 set: Some(tidy(mm_from_m(self.bar_m)).to_string()),
-                t_s: None,
                 bar_m: Some(self.bar_m),
-                motion: None,
-                file: 0,
-                line: 0,
-                number: 0,
+                ..PoseRow::of(id, ballbar::Measurement { pairing, q, length_m, weight: 1.0 })
             },
             latitude_rad,
             longitude_rad,

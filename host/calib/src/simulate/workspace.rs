@@ -8,6 +8,7 @@ use crate::model::JointLimits;
 
 /// Difference of two chains at the tool, over random poses within the joint limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ToolError {
     /// Poses compared.
     pub poses: usize,
