@@ -4,7 +4,7 @@ mod previous;
 
 use ballbar::Chain;
 use ballbar::wire::{Answer, Command, ParameterSet, WhichSet};
-use ballbar_calib::model::{CalibrationVerdict, JointLimits, Robot};
+use ballbar_calib::model::{CalibrationVerdict, JointLimits, Robot, Standing};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -129,10 +129,10 @@ impl ApplyArgs {
 /// A robot is put on the board when its fit was found to be good, with reservations or without.
 fn check_calibrated(robot: &Robot) -> Result<(), ApplyError> {
     let name = || robot.source.as_str().to_owned();
-    match (&robot.calibration, robot.verdict()) {
-        (_, Some(CalibrationVerdict::Calibrated | CalibrationVerdict::Reserved)) => Ok(()),
-        (Some(_), None) => Err(ApplyError::NotJudged(name())),
-        (None, None) => Err(ApplyError::NotCalibrated(name())),
+    match robot.standing() {
+        Standing::Calibrated | Standing::Reserved => Ok(()),
+        Standing::NotJudged => Err(ApplyError::NotJudged(name())),
+        Standing::Design => Err(ApplyError::NotCalibrated(name())),
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use ballbar::{JointKind, JointVector};
 use ballbar_calib::kinematics::{Compensation, Compensator, link_angles};
-use ballbar_calib::model::{CalibrationVerdict, Robot};
+use ballbar_calib::model::{Robot, Standing};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -213,13 +213,14 @@ fn compensated(
 
 /// What its file says of the robot, where that is not that it is calibrated.
 fn standing_warning(robot: &Robot) -> Option<String> {
-    match (&robot.calibration, robot.verdict()) {
-        (_, Some(CalibrationVerdict::Calibrated)) => None,
-        (Some(calibration), Some(CalibrationVerdict::Reserved)) => {
-            Some(format!("the robot is calibrated with reservations: {}", calibration.reasons.join(" ")))
+    match robot.standing() {
+        Standing::Calibrated => None,
+        Standing::Reserved => {
+            let reasons = robot.calibration.as_ref().map_or_else(String::new, |calibration| calibration.reasons.join(" "));
+            Some(format!("the robot is calibrated with reservations: {reasons}"))
         }
-        (Some(_), None) => Some("the robot's [calibration] has no verdict: nothing says that the fit was good".to_owned()),
-        (None, _) => Some("the robot has no [calibration]: its file says nothing of having been fitted".to_owned()),
+        Standing::NotJudged => Some("the robot's [calibration] has no verdict: nothing says that the fit was good".to_owned()),
+        Standing::Design => Some("the robot has no [calibration]: its file says nothing of having been fitted".to_owned()),
     }
 }
 

@@ -11,5 +11,5 @@ pub use calibration::{Calibration, CalibrationVerdict};
 pub use dataset::{Dataset, MixedSigma, Motion, PoseRow, RowWarning};
 pub use limits::{BeyondLimits, JointLimits};
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
-pub use robot::{EncoderFacts, Robot};
+pub use robot::{EncoderFacts, Robot, Standing};
 pub use solids::Solids;

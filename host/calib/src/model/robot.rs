@@ -1,5 +1,7 @@
 //! A robot: a chain, its limits and encoders, and when and from what it was calibrated.
 
+use std::fmt;
+
 use ballbar::{Chain, Coupling, Encoder};
 
 use super::calibration::{Calibration, CalibrationVerdict};
@@ -37,13 +39,44 @@ impl Robot {
         self.calibration.as_ref().and_then(|calibration| calibration.verdict)
     }
 
-    /// What this robot's parameters are, in a few words.
-    pub fn standing(&self) -> &'static str {
+    /// What this robot's parameters are.
+    pub fn standing(&self) -> Standing {
         match (&self.calibration, self.verdict()) {
-            (_, Some(CalibrationVerdict::Calibrated)) => "calibrated",
-            (_, Some(CalibrationVerdict::Reserved)) => "calibrated, with reservations",
-            (Some(_), None) => "fitted, but not found to be calibrated",
-            (None, None) => "design, not calibrated",
+            (_, Some(CalibrationVerdict::Calibrated)) => Standing::Calibrated,
+            (_, Some(CalibrationVerdict::Reserved)) => Standing::Reserved,
+            (Some(_), None) => Standing::NotJudged,
+            (None, None) => Standing::Design,
         }
+    }
+}
+
+/// What a robot's parameters are, by what is kept of the fit behind them: the one rule of who may rely on them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// No fit made them.
+    Design,
+    /// A fit made them, and nothing says that it was good.
+    NotJudged,
+    /// A good fit made them, and something weighs on it.
+    Reserved,
+    /// A good fit made them, and nothing stands against it.
+    Calibrated,
+}
+
+impl Standing {
+    /// Whether the fit was found to be good, with reservations or without.
+    pub fn is_calibrated(self) -> bool {
+        matches!(self, Self::Calibrated | Self::Reserved)
+    }
+}
+
+impl fmt::Display for Standing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Design => "design, not calibrated",
+            Self::NotJudged => "fitted, but not found to be calibrated",
+            Self::Reserved => "calibrated, with reservations",
+            Self::Calibrated => "calibrated",
+        })
     }
 }
