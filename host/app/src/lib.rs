@@ -12,7 +12,7 @@
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
 //! | [`report`] | a calibration as a page for people: facts, figures, HTML |
-//! | [`remedies`] | what to do about the errors of the calibration library |
+//! | [`remedies`] | what to do about the errors of the calibration library and of the procedures |
 //! | [`deadline`] | how long a whole answer may take |
 //! | `platform` | what differs between operating systems |
 //! | [`terminal`] | what is printed, said, shown and typed |

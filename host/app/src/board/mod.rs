@@ -9,6 +9,7 @@ mod plausible;
 mod port;
 mod robot_on_board;
 mod tally;
+mod upload;
 mod verify;
 
 pub use encoders::{NoEncoders, joint_encoders};
@@ -20,4 +21,5 @@ pub use plausible::Implausible;
 pub use port::{BAUD, Port};
 pub use robot_on_board::{NOMINAL_TRAVEL_M, RobotOnBoard, SetError, nominal_lvdt, parameter_set};
 pub use tally::{Refusals, RefusedMessages, StreamLosses};
+pub use upload::{Admission, LvdtOrigin, SetSummary, Upload, UploadError, UploadStep, Uploaded, bring_back};
 pub use verify::{KinematicsDifference, rms_kinematics, rounding_of_kinematics, verify_kinematics};

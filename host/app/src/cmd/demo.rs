@@ -2,6 +2,7 @@
 
 mod bench;
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use ballbar_calib::assess::{Assessment, Evidence};
@@ -14,11 +15,11 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::apply::upload;
+use super::apply::say_steps;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated, write_file, write_files};
-use crate::board::{StreamLosses, rms_kinematics};
+use crate::board::{Admission, StreamLosses, Upload, rms_kinematics};
 use crate::files::{FileKind, Output, RIGS, Source, append_poses, open_rig, open_robot, robot_source};
 use crate::remedies::Remedied;
 use crate::terminal::table::Columns;
@@ -96,7 +97,7 @@ const FITTED_BAR_MM: f64 = 460.0;
 const OTHER_BAR_MM: f64 = 610.0;
 const WORKSPACE_POSES: usize = 5_000;
 /// Joint vectors at which the board is asked where the tool is.
-const BOARD_POSES: usize = 300;
+const BOARD_POSES: NonZeroUsize = NonZeroUsize::new(300).unwrap();
 
 impl DemoArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
@@ -167,12 +168,13 @@ struct OnBoard {
 
 /// Puts the calibrated robot on the board; the board's own poses against the true robot's, before and after.
 fn put_on_board(bench: &mut Bench<'_>, truth: &Robot, calibrated: &Robot) -> Result<OnBoard, CommandError> {
-    let before_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES)?;
-    let applied = upload(&mut bench.link, calibrated, BOARD_POSES)?;
-    let after_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES)?;
+    let upload = Upload::new(calibrated, Admission::Calibrated, BOARD_POSES).map_err(Remedied)?;
+    let before_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES.get())?;
+    let uploaded = upload.put(&mut bench.link, &mut say_steps(BOARD_POSES)).map_err(Remedied)?;
+    let after_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES.get())?;
     Ok(OnBoard {
         tool: Change { before_mm: mm_from_m(before_m), after_mm: mm_from_m(after_m) },
-        difference_um: applied.max_position_difference_um,
+        difference_um: uploaded.difference.position_m * 1e6,
     })
 }
 
