@@ -3,6 +3,7 @@
 mod encoders;
 mod errors;
 mod filter;
+mod home;
 mod link;
 mod lvdt_fit;
 mod plausible;
@@ -15,6 +16,7 @@ mod verify;
 pub use encoders::{NoEncoders, joint_encoders};
 pub use errors::{BoardError, PortError};
 pub use filter::MessageFilter;
+pub use home::{HomeError, Homed, Homing, OtherRobot, check_kinds};
 pub use link::{BoardLink, Frame};
 pub use lvdt_fit::{LvdtFitError, LvdtPoint, check_lvdt_points, fit_lvdt};
 pub use plausible::Implausible;

@@ -5,7 +5,26 @@ use std::borrow::Cow;
 use ballbar::wire::WhichSet;
 
 use super::{Remedy, own_help};
-use crate::board::UploadError;
+use crate::board::{HomeError, OtherRobot, UploadError};
+
+impl Remedy for HomeError {
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        let words = match self {
+            Self::Board(error) => return own_help(error),
+            Self::OtherRobot(error) => return error.remedy(),
+            Self::NoParameters => "Upload a robot first: host-cal apply PORT --robot robot.toml",
+            Self::Joints { .. } => "Give one value a joint.",
+            Self::OutOfRange { .. } => "Is the value in degrees or millimetres? Nothing was changed.",
+        };
+        Some(words.into())
+    }
+}
+
+impl Remedy for OtherRobot {
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        Some("Give the robot that the board holds: `host-cal status PORT` names it.".into())
+    }
+}
 
 impl Remedy for UploadError {
     fn remedy(&self) -> Option<Cow<'static, str>> {
