@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use ballbar::wire::WhichSet;
 
 use super::{Remedy, own_help};
-use crate::board::{HomeError, OtherRobot, UploadError};
+use crate::board::{HomeError, LvdtError, OtherRobot, UploadError};
 
 impl Remedy for HomeError {
     fn remedy(&self) -> Option<Cow<'static, str>> {
@@ -15,6 +15,18 @@ impl Remedy for HomeError {
             Self::NoParameters => "Upload a robot first: host-cal apply PORT --robot robot.toml",
             Self::Joints { .. } => "Give one value a joint.",
             Self::OutOfRange { .. } => "Is the value in degrees or millimetres? Nothing was changed.",
+        };
+        Some(words.into())
+    }
+}
+
+impl Remedy for LvdtError {
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        let words = match self {
+            Self::Board(error) => return own_help(error),
+            Self::NoParameters => "Upload a robot first: host-cal apply PORT --robot robot.toml",
+            Self::Ended { .. } | Self::TooFarOff { .. } => "Nothing was changed on the board.",
+            Self::NotStreaming => "Was it started again? Nothing was changed on the board.",
         };
         Some(words.into())
     }
