@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use ballbar::wire::WhichSet;
 
 use super::{Remedy, own_help};
-use crate::board::{HomeError, LvdtError, OtherRobot, UploadError};
+use crate::board::{HomeError, LvdtError, OtherRobot, ResetError, UploadError};
 
 impl Remedy for HomeError {
     fn remedy(&self) -> Option<Cow<'static, str>> {
@@ -35,6 +35,15 @@ impl Remedy for LvdtError {
 impl Remedy for OtherRobot {
     fn remedy(&self) -> Option<Cow<'static, str>> {
         Some("Give the robot that the board holds: `host-cal status PORT` names it.".into())
+    }
+}
+
+impl Remedy for ResetError {
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        match self {
+            Self::Board(error) => own_help(error),
+            Self::NotBack { .. } => Some("Switch it off and on.".into()),
+        }
     }
 }
 
