@@ -1,6 +1,7 @@
 //! What the errors of the calibration library and of the procedures are called here, and what to do about them.
 
 mod board;
+mod collecting;
 
 use std::borrow::Cow;
 use std::error::Error;
