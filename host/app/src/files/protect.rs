@@ -72,8 +72,7 @@ pub(super) fn check(given: &Path, followed: &Path, written: FileKind, force: boo
 fn is_of_session(path: &Path) -> bool {
     let Some(name) = path.file_name() else { return false };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let is_session =
-        |folder: &Path| [LOG_NAME, DESCRIPTION_NAME].iter().any(|name| folder.join(name).is_file());
+    let is_session = |folder: &Path| [LOG_NAME, DESCRIPTION_NAME].iter().any(|name| folder.join(name).is_file());
     let is_programs = folder.file_name().is_some_and(|name| name.eq_ignore_ascii_case(PROGRAMS_NAME));
     if is_programs && folder.parent().is_some_and(is_session) {
         return true;
