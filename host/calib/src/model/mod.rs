@@ -2,6 +2,7 @@
 
 mod calibration;
 mod dataset;
+mod hold_out;
 mod limits;
 mod rig;
 mod robot;
@@ -9,6 +10,7 @@ mod solids;
 
 pub use calibration::{Calibration, CalibrationVerdict};
 pub use dataset::{Dataset, MixedSigma, Motion, PoseRow, RowWarning};
+pub use hold_out::{Choice, Condition, HeldOut, HoldOutError};
 pub use limits::{BeyondLimits, JointLimits};
 pub use rig::{Bar, NamedPoint, PairingId, Rig};
 pub use robot::{EncoderFacts, Robot, Standing};
