@@ -3,7 +3,6 @@
 mod mover;
 mod operator;
 mod picture;
-mod programs;
 mod report;
 mod session_files;
 
@@ -16,7 +15,6 @@ use miette::Diagnostic;
 use mover::MoverArgs;
 use operator::{Hand, Terminal};
 use picture::Still;
-use programs::Programs;
 use report::CollectReport;
 use session_files::SessionFiles;
 use thiserror::Error;
@@ -28,7 +26,7 @@ use super::report::print;
 use super::stream::{lock_error, record_error, say_recovered};
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
-    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, TrackOptions,
+    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, Programs, TrackOptions,
     read_board, remove_lag,
 };
 use crate::remedies::Remedied;
@@ -144,7 +142,7 @@ impl CollectArgs {
         let guide = match programs {
             None => Guide::Hand,
             Some(programs) => {
-                programs.write(&self.session)?;
+                programs.write(&self.session).map_err(CommandError::output)?;
                 Guide::Programs(programs.names)
             }
         };

@@ -55,11 +55,6 @@ pub(super) fn write_files(files: &[NamedFile], force: bool) -> Result<(), Comman
     })
 }
 
-/// Makes a folder, and those above it, where they are missing.
-pub(super) fn make_folder(folder: &Path) -> Result<(), CommandError> {
-    files::make_folder(folder).map_err(CommandError::output)
-}
-
 /// Writes a file of the session that is being recorded.
 pub(super) fn write_session_file(path: &Path, contents: &str) -> Result<(), CommandError> {
     write_atomically(path, contents).map_err(CommandError::output)

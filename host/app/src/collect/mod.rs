@@ -39,7 +39,7 @@ pub use mover::Mover;
 pub use now::{Goal, Now};
 pub use operator::{Event, Measured, Operator, Unattended, Wish};
 pub use repeat::Repeat;
-pub use shell_programs::{ProgramOptions, ShellProgram, plan_programs};
+pub use shell_programs::{ProgramOptions, Programs, ShellProgram, plan_programs};
 pub use track::{MovingPose, TrackOptions};
 
 use ballbar::{JointKind, JointVector};
