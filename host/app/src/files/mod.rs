@@ -37,7 +37,7 @@ pub use read_poses::{append_poses, read_poses};
 pub use rig::{open_rig, parse_rig};
 pub use robot::{MOST_NAME_BYTES, calibrated_toml, open_robot, parse_robot, robot_source};
 pub use source::{InputError, Source};
-pub use targets::{Target, compensated_csv, pose_as_written, read_targets};
+pub use targets::{Target, compensated_csv, joints_as_written, pose_as_written, read_targets};
 pub use together::{FilesError, FolderError, NamedFile, make_folder, write_files};
 pub use urdf::{ENCODER_ELEMENT, Imported, UrdfEnds, parse_urdf, read_urdf};
 pub use write::{Output, WriteError, write_atomically, write_atomically_with};
