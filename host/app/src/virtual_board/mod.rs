@@ -7,6 +7,7 @@
 //!
 //! The robot, the bar and the wiring are simulated; all that the host talks to is the code that runs on a board.
 
+mod bench;
 mod controller;
 mod counters;
 mod driver;
@@ -41,6 +42,7 @@ use machine::{BitErrors, Machine};
 use pty::Pty;
 use runner::{Runner, Shared};
 
+pub use bench::{Bench, BenchError, BenchRun, Scene};
 pub use controller::{Controller, ControllerOptions};
 pub use counters::COUNTER_WIDTHS;
 pub use driver::{Driven, Driver, Order, Stance, driver};
