@@ -1,8 +1,6 @@
 //! `host-cal collect`: walk a plan and keep the poses.
 
 mod mover;
-mod operator;
-mod picture;
 mod report;
 mod session_files;
 
@@ -13,8 +11,6 @@ use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace, UnsafePlan};
 use clap::Args;
 use miette::Diagnostic;
 use mover::MoverArgs;
-use operator::{Hand, Terminal};
-use picture::Still;
 use report::CollectReport;
 use session_files::SessionFiles;
 use thiserror::Error;
@@ -34,6 +30,7 @@ use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run, SessionLock};
 use crate::terminal::EndRequest;
+use crate::terminal::operator::{Hand, Still, Terminal};
 use crate::units::m_from_mm;
 
 /// Walk a plan: move the robot from pose to pose, wait until it stands, and keep what the bar measures
