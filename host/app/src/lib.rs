@@ -12,7 +12,8 @@
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
 //! | [`report`] | a calibration as a page for people: facts, figures, HTML |
-//! | [`remedies`] | what to do about the errors of the calibration library |
+//! | [`remedies`] | what to do about the errors of the calibration library and of the procedures |
+//! | [`shell`] | manual pages, and what completes arguments |
 //! | [`deadline`] | how long a whole answer may take |
 //! | `platform` | what differs between operating systems |
 //! | [`terminal`] | what is printed, said, shown and typed |
@@ -36,6 +37,7 @@ pub mod report;
 pub mod robot_link;
 #[expect(clippy::disallowed_methods, reason = "a session appends to its log, and reads its own files before it replaces them")]
 pub mod session;
+pub mod shell;
 pub mod terminal;
 pub mod text;
 pub mod units;

@@ -1,4 +1,7 @@
-//! What the errors of the calibration library are called here, and what to do about them: the only such place.
+//! What the errors of the calibration library and of the procedures are called here, and what to do about them.
+
+mod board;
+mod collecting;
 
 use std::borrow::Cow;
 use std::error::Error;
@@ -22,8 +25,13 @@ pub trait Remedy: Error + Send + Sync + 'static {
         None
     }
 
-    /// What to do about it.
-    fn remedy(&self) -> Cow<'static, str>;
+    /// What to do about it, where there is something.
+    fn remedy(&self) -> Option<Cow<'static, str>>;
+}
+
+/// The help of an error within another that has its own.
+fn own_help(error: &dyn Diagnostic) -> Option<Cow<'static, str>> {
+    error.help().map(|help| help.to_string().into())
 }
 
 impl<E: Remedy> fmt::Display for Remedied<E> {
@@ -43,7 +51,7 @@ impl<E: Remedy> Error for Remedied<E> {
 
 impl<E: Remedy> Diagnostic for Remedied<E> {
     fn help(&self) -> Option<Box<dyn fmt::Display + '_>> {
-        Some(Box::new(self.0.remedy()))
+        self.0.remedy().map(|remedy| Box::new(remedy) as _)
     }
 }
 
@@ -54,38 +62,34 @@ impl<E: Remedy> From<E> for Remedied<E> {
 }
 
 impl Remedy for FitError {
-    fn remedy(&self) -> Cow<'static, str> {
-        match self {
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        let words = match self {
             Self::NoRedundancy { .. } => "Measure more poses (the paper took some 800), or hold more parameters with --hold.",
             Self::NoSuchParameter(_) => "A robot of J joints has x1 … gamma1, offset1, scale1 up to gamma(J+1).",
-        }
-        .into()
+        };
+        Some(words.into())
     }
 }
 
 impl Remedy for NothingAllowed {
-    fn remedy(&self) -> Cow<'static, str> {
-        "A command has to be within the limits of both: give one of the files the joint's true limits.".into()
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        Some("A command has to be within the limits of both: give one of the files the joint's true limits.".into())
     }
 }
 
 impl Remedy for ShellError {
-    fn remedy(&self) -> Cow<'static, str> {
-        match self {
-            Self::OutOfReach { .. } => {
-                "Move the chucks nearer to the robot, take another bar length with --bar, or ask for fewer poses."
-            }
-        }
-        .into()
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        let Self::OutOfReach { .. } = self;
+        Some("Move the chucks nearer to the robot, take another bar length with --bar, or ask for fewer poses.".into())
     }
 }
 
 impl Remedy for FixturesOverlap {
-    fn remedy(&self) -> Cow<'static, str> {
-        match self.turned_plate_rad() {
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        Some(match self.turned_plate_rad() {
             Some(away_rad) => turn_the_spheres(away_rad).into(),
             None => "Check the positions in rig.toml, or give the true sizes in its [solids] table (docs/files.md).".into(),
-        }
+        })
     }
 }
 
@@ -102,15 +106,15 @@ impl Remedy for PlanError {
         }
     }
 
-    fn remedy(&self) -> Cow<'static, str> {
-        match self {
-            Self::Overlap(overlap) => overlap.remedy(),
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        Some(match self {
+            Self::Overlap(overlap) => return overlap.remedy(),
             Self::OutOfReach { cause, .. } => of_cause(cause),
             Self::TooFewToChoose { .. } => {
                 "Ask for fewer, or give more to choose from with --per-pair, --bar or --pairings.".into()
             }
             Self::FewerThanParameters { .. } => "Ask for three times as many poses as parameters, or more.".into(),
-        }
+        })
     }
 }
 

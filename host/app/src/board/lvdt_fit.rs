@@ -48,12 +48,38 @@ const LEAST_SPREAD: f64 = 256.0;
 /// The curve may be used a little beyond the codes that it was measured at, as a part of their spread.
 const MARGIN: f64 = 0.01;
 
-/// Fits a polynomial of `degree` by least squares. Returns the curve, rounded to the board's f32, and the residuals of the points
-/// with that curve, metres.
+/// A curve, and how well it fits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LvdtFit {
+    /// The curve, rounded to the board's f32.
+    pub curve: LvdtCurve,
+    /// Known displacements less those of this curve, metres.
+    pub residuals_m: Vec<f64>,
+}
+
+impl LvdtFit {
+    /// RMS residual, metres.
+    pub fn rms_m(&self) -> f64 {
+        let squares: f64 = self.residuals_m.iter().map(|m| m * m).sum();
+        (squares / self.residuals_m.len() as f64).sqrt()
+    }
+
+    /// Largest residual, without its sign, metres.
+    pub fn largest_m(&self) -> f64 {
+        self.residuals_m.iter().fold(0.0, |max, m| max.max(m.abs()))
+    }
+
+    /// Whether no residual is larger.
+    pub fn is_within(&self, tolerance_m: f64) -> bool {
+        self.largest_m() <= tolerance_m
+    }
+}
+
+/// Fits a polynomial of `degree` by least squares.
 ///
 /// # Errors
 /// [`LvdtFitError`].
-pub fn fit_lvdt(points: &[LvdtPoint], degree: usize) -> Result<(LvdtCurve, Vec<f64>), LvdtFitError> {
+pub fn fit_lvdt(points: &[LvdtPoint], degree: usize) -> Result<LvdtFit, LvdtFitError> {
     check_lvdt_points(points.len(), degree)?;
     let terms = degree.min(LVDT_COEFFICIENTS - 1) + 1;
     let codes = points.iter().map(|point| point.code);
@@ -79,7 +105,8 @@ pub fn fit_lvdt(points: &[LvdtPoint], degree: usize) -> Result<(LvdtCurve, Vec<f
         return Err(LvdtFitError::NotMonotonic);
     }
     let at = |code: f64| curve.displacement_of_code_m::<f64>(code).unwrap_or(f64::NAN);
-    Ok((curve, points.iter().map(|point| point.displacement_m - at(point.code)).collect()))
+    let residuals_m = points.iter().map(|point| point.displacement_m - at(point.code)).collect();
+    Ok(LvdtFit { curve, residuals_m })
 }
 
 /// Whether so many lengths are enough for a polynomial of `degree`: to be known before they are measured.
@@ -111,7 +138,7 @@ mod tests {
     #[test]
     fn a_cubic_is_found_again_to_the_resolution_of_f32() {
         let cubic = |u: f64| 0.0003 + 0.0400 * u - 0.0002 * u * u + 0.0015 * u.powi(3);
-        let (curve, residuals) = fit_lvdt(&points(cubic, 9), 3).unwrap();
+        let LvdtFit { curve, residuals_m: residuals } = fit_lvdt(&points(cubic, 9), 3).unwrap();
         assert!(residuals.iter().all(|residual| residual.abs() < 5e-9), "{residuals:?}");
         for (found, expected) in curve.coefficients_m.iter().zip([0.0003, 0.04, -0.0002, 0.0015, 0.0, 0.0]) {
             assert!((found - expected).abs() < 1e-8, "{found} {expected}");
@@ -123,7 +150,7 @@ mod tests {
     fn one_wrong_length_shows_in_the_residuals() {
         let mut measured = points(|u| 0.04 * u, 7);
         measured[3].displacement_m += 0.001;
-        let (_, residuals) = fit_lvdt(&measured, 1).unwrap();
+        let residuals = fit_lvdt(&measured, 1).unwrap().residuals_m;
         assert!(residuals[3] > 0.0008 && residuals.iter().enumerate().all(|(i, r)| i == 3 || r.abs() < 0.0002));
     }
 

@@ -38,7 +38,7 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
     let couplings = robot.encoders.iter().flat_map(|facts| &facts.couplings);
     let set = ParameterSet {
         name: cut_to(&robot.name, 32),
-        is_calibrated: robot.verdict().is_some(),
+        is_calibrated: robot.standing().is_calibrated(),
         kinds: robot.chain.joint_kinds().iter().copied().collect(),
         parameters: robot.chain.parameters().iter().map(|&value| value as f32).collect(),
         encoders: encoders

@@ -1,23 +1,16 @@
 //! `host-cal collect`: walk a plan and keep the poses.
 
 mod mover;
-mod operator;
-mod picture;
-mod programs;
 mod report;
 mod session_files;
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use ballbar::wire::{Answer, Command};
 use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace, UnsafePlan};
 use clap::Args;
 use miette::Diagnostic;
-use mover::{Mover, MoverArgs};
-use operator::{Hand, Terminal};
-use picture::Still;
-use programs::Programs;
+use mover::MoverArgs;
 use report::CollectReport;
 use session_files::SessionFiles;
 use thiserror::Error;
@@ -29,14 +22,15 @@ use super::report::print;
 use super::stream::{lock_error, record_error, say_recovered};
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
-    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, ProgramOptions, TrackOptions, check_board,
-    remove_lag,
+    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, Programs, TrackOptions,
+    read_board, remove_lag,
 };
 use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Recorder, Run, SessionLock};
 use crate::terminal::EndRequest;
+use crate::terminal::operator::{Hand, Still, Terminal};
 use crate::units::m_from_mm;
 
 /// Walk a plan: move the robot from pose to pose, wait until it stands, and keep what the bar measures
@@ -123,9 +117,6 @@ enum ArgumentError {
     #[error("the plan has {0}")]
     #[diagnostic(help("Nothing was moved. `host-cal plan --check` says more; plan again, or correct the rig's [solids]."))]
     UnsafePlan(UnsafePlan),
-    #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
-    #[diagnostic(help("Tell it the robot first: host-cal apply PORT --robot robot.toml --uncalibrated"))]
-    NoParameters,
 }
 
 impl CollectArgs {
@@ -142,16 +133,13 @@ impl CollectArgs {
         }
         let programs = self.programs(&mover, &plan, &options)?;
         let mut link = self.port.connect()?;
-        let robot = RobotOnBoard::read(&mut link)?.ok_or(ArgumentError::NoParameters)?;
-        if let Answer::Status(status) = link.request(Command::Status)? {
-            check_board(&files.robot, &robot.0, robot.0.is_homed_by(&status))?;
-        }
+        let robot = read_board(&mut link, &files.robot)?;
         let lock = SessionLock::acquire(&self.session).map_err(lock_error)?;
         files.write()?;
         let guide = match programs {
             None => Guide::Hand,
             Some(programs) => {
-                programs.write(&self.session)?;
+                programs.write(&self.session).map_err(CommandError::output)?;
                 Guide::Programs(programs.names)
             }
         };
@@ -170,10 +158,7 @@ impl CollectArgs {
         let mut terminal = Terminal::new(hand, Still::new(head, &files.robot), end);
         let began = Instant::now();
         let mut collector = Collector::new(ledger, board, &mut terminal, options);
-        let ended = match &mut mover {
-            Mover::Link(link) => collector.drive(link.as_mut()),
-            Mover::Programs(_) | Mover::Hand => collector.follow(self.nearness(), &guide),
-        };
+        let ended = collector.walk(&mut mover, self.nearness(), &guide);
         let (summary, ledger, closed) = collector.end();
         terminal.close();
         let mut report = CollectReport::new(&self.session, &files, &ledger, &summary, &ended, began.elapsed());

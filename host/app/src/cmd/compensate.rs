@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use ballbar::{JointKind, JointVector};
-use ballbar_calib::kinematics::{Compensation, Compensator, link_angles};
-use ballbar_calib::model::{CalibrationVerdict, Robot};
+use ballbar::JointVector;
+use ballbar_calib::kinematics::{Compensation, Compensator, FarTurn, link_angles};
+use ballbar_calib::model::{Robot, Standing};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -13,7 +13,9 @@ use thiserror::Error;
 use super::inputs::{ForceArgs, ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
-use crate::files::{FileKind, Output, Source, Target, compensated_csv, open_robot, pose_as_written, read_targets};
+use crate::files::{
+    FileKind, Output, Source, Target, compensated_csv, joints_as_written, open_robot, pose_as_written, read_targets,
+};
 use crate::remedies::Remedied;
 use crate::terminal::table::{Columns, fixed};
 use crate::text::shown_path;
@@ -99,7 +101,16 @@ impl CompensateArgs {
         let compensator = Compensator::new(&robot, &nominal).map_err(Remedied)?;
         let start = self.start(&nominal, &compensator)?;
         let targets = read_targets(&Source::read_rows(&self.targets)?, &nominal)?;
-        let (done, not_reached) = compensated(&robot, &compensator, &targets, start);
+        let kinds = robot.chain.joint_kinds();
+        let goals = targets.iter().map(|target| &target.goal);
+        let found = compensator.compensate_all(goals, start, |q| joints_as_written(kinds, q), pose_as_written);
+        let (mut done, mut not_reached) = (Vec::new(), Vec::new());
+        for (&Target { line, .. }, found) in targets.iter().zip(found) {
+            match found {
+                Ok(found) => done.push((line, found)),
+                Err(why) => not_reached.push(NotReached { line, why: why.to_string() }),
+            }
+        }
         let warnings = self.warnings(&robot, &done, &not_reached);
         warnings.iter().for_each(|warning| warn(warning));
         if let Some(path) = &self.out {
@@ -130,12 +141,13 @@ impl CompensateArgs {
         warnings.extend(standing_warning(robot));
         warnings.extend(not_reached.iter().map(|missed| format!("{}: {}", place(missed.line), missed.why)));
         for (line, found) in done {
-            if let Some((joint, unit, turn)) = far_turn(robot, found) {
+            if let Some(FarTurn { joint, kind, way }) = found.far_turn(robot.chain.joint_kinds()) {
+                let unit = ScreenUnit::from(kind);
                 warnings.push(format!(
                     "{}: joint {joint} goes {:.1} {} from where the controller's model has it: the arm is nearly singular there, \
                      or on another branch",
                     place(*line),
-                    unit.from_si(turn),
+                    unit.from_si(way),
                     unit.name()
                 ));
             }
@@ -190,60 +202,17 @@ impl CompensateArgs {
     }
 }
 
-/// Commands with the lines of their targets, and the targets that have none. Each row's branch is the one nearest to the row before.
-fn compensated(
-    robot: &Robot,
-    compensator: &Compensator,
-    targets: &[Target],
-    start: JointVector<f64>,
-) -> (Vec<(usize, Compensation)>, Vec<NotReached>) {
-    let (mut done, mut not_reached) = (Vec::new(), Vec::new());
-    let mut before = start;
-    for target in targets {
-        match compensator.compensate(&target.goal, &before, |q| as_written(robot, q), pose_as_written) {
-            Ok(found) => {
-                before = found.nominal_q;
-                done.push((target.line, found));
-            }
-            Err(why) => not_reached.push(NotReached { line: target.line, why: why.to_string() }),
-        }
-    }
-    (done, not_reached)
-}
-
 /// What its file says of the robot, where that is not that it is calibrated.
 fn standing_warning(robot: &Robot) -> Option<String> {
-    match (&robot.calibration, robot.verdict()) {
-        (_, Some(CalibrationVerdict::Calibrated)) => None,
-        (Some(calibration), Some(CalibrationVerdict::Reserved)) => {
-            Some(format!("the robot is calibrated with reservations: {}", calibration.reasons.join(" ")))
+    match robot.standing() {
+        Standing::Calibrated => None,
+        Standing::Reserved => {
+            let reasons = robot.calibration.as_ref().map_or_else(String::new, |calibration| calibration.reasons.join(" "));
+            Some(format!("the robot is calibrated with reservations: {reasons}"))
         }
-        (Some(_), None) => Some("the robot's [calibration] has no verdict: nothing says that the fit was good".to_owned()),
-        (None, _) => Some("the robot has no [calibration]: its file says nothing of having been fitted".to_owned()),
+        Standing::NotJudged => Some("the robot's [calibration] has no verdict: nothing says that the fit was good".to_owned()),
+        Standing::Design => Some("the robot has no [calibration]: its file says nothing of having been fitted".to_owned()),
     }
-}
-
-/// The joint that goes farthest from where the controller would have it, and how far, in its unit of SI, if that is far.
-fn far_turn(robot: &Robot, found: &Compensation) -> Option<(usize, ScreenUnit, f64)> {
-    /// Five degrees, or fifty millimetres: more than any calibration moves a joint by, away from singular postures.
-    const FAR_RAD: f64 = std::f64::consts::PI / 36.0;
-    const FAR_M: f64 = 0.05;
-    let ways = found.q.as_array().iter().zip(found.nominal_q.as_array()).map(|(new, old)| (new - old).abs());
-    let joints = ways.zip(robot.chain.joint_kinds()).enumerate().map(|(i, (way, &kind))| {
-        let far = if kind == JointKind::Revolute { FAR_RAD } else { FAR_M };
-        (way / far, (i + 1, ScreenUnit::from(kind), way))
-    });
-    joints.filter(|(share, _)| *share > 1.0).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, farthest)| farthest)
-}
-
-/// Joints as a file has them: to the nanodegree and the picometre.
-fn as_written(robot: &Robot, mut q: JointVector<f64>) -> JointVector<f64> {
-    const PER_UNIT: f64 = 1e9;
-    for (value, &kind) in q.as_array_mut().iter_mut().zip(robot.chain.joint_kinds()) {
-        let unit = ScreenUnit::from(kind);
-        *value = unit.to_si((unit.from_si(*value) * PER_UNIT).round() / PER_UNIT);
-    }
-    q
 }
 
 impl Report for CompensateReport {

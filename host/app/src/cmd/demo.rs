@@ -1,29 +1,29 @@
 //! `host-cal demo`: a calibration from nothing to proof, without hardware: through the board's own firmware and over its wire.
 
-mod bench;
-
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use ballbar_calib::assess::{Assessment, Evidence};
 use ballbar_calib::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
 use ballbar_calib::model::{Dataset, Robot};
 use ballbar_calib::simulate::tool_error;
-use bench::{Bench, SIGMA_MM, Scene};
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::apply::upload;
+use super::apply::say_steps;
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_calibrated, write_file, write_files};
-use crate::board::{StreamLosses, rms_kinematics};
+use crate::board::{Admission, StreamLosses, Upload, rms_kinematics};
 use crate::files::{FileKind, Output, RIGS, Source, append_poses, open_rig, open_robot, robot_source};
 use crate::remedies::Remedied;
+use crate::terminal::progress;
 use crate::terminal::table::Columns;
 use crate::text::{one_line, shown_path};
-use crate::units::mm_from_m;
+use crate::units::{m_from_mm, mm_from_m};
+use crate::virtual_board::{Bench, BenchRun, Scene};
 
 /// See a whole calibration without hardware: stream, settle, fit, validate, apply, verify
 #[derive(Args)]
@@ -92,11 +92,14 @@ struct RefusedError(String);
 
 /// What the demo printed, left among its files; by it the demo knows its own folder again.
 const SUMMARY_NAME: &str = "demo.txt";
+/// Noise of every length, the paper's.
+const SIGMA_MM: f64 = 0.084;
+const POSES_PER_PAIRING: usize = 90;
 const FITTED_BAR_MM: f64 = 460.0;
 const OTHER_BAR_MM: f64 = 610.0;
 const WORKSPACE_POSES: usize = 5_000;
 /// Joint vectors at which the board is asked where the tool is.
-const BOARD_POSES: usize = 300;
+const BOARD_POSES: NonZeroUsize = NonZeroUsize::new(300).unwrap();
 
 impl DemoArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
@@ -106,21 +109,26 @@ impl DemoArgs {
         self.prepare_folder()?;
 
         let mut bench = Bench::power_up(&scene, self.seed)?;
-        let fitted_shells = bench.collect("46 cm shells", FITTED_BAR_MM, self.seed)?;
-        let other_shells = bench.collect("61 cm shells", OTHER_BAR_MM, self.seed.wrapping_add(1))?;
+        let mut collect = |what, bar_mm, seed| {
+            let (bar_m, sigma_m) = (m_from_mm(bar_mm), m_from_mm(SIGMA_MM));
+            let bar = progress((rig.all_pairings().len() * POSES_PER_PAIRING) as u64, what);
+            bench.collect(&BenchRun { bar_m, per_pairing: POSES_PER_PAIRING, sigma_m, seed }, || bar.inc(1))
+        };
+        let fitted_poses_csv = collect("46 cm shells", FITTED_BAR_MM, self.seed)?;
+        let other_poses_csv = collect("61 cm shells", OTHER_BAR_MM, self.seed.wrapping_add(1))?;
         let (fitted_name, other_name) = ("poses-460.csv", "poses-610.csv");
         let mut fitted_poses = Dataset::default();
-        append_poses(&mut fitted_poses, &Source::new(fitted_name, &fitted_shells.csv), design, rig)?;
+        append_poses(&mut fitted_poses, &Source::new(fitted_name, &fitted_poses_csv), design, rig)?;
         let mut other_poses = Dataset::default();
-        append_poses(&mut other_poses, &Source::new(other_name, &other_shells.csv), design, rig)?;
+        append_poses(&mut other_poses, &Source::new(other_name, &other_poses_csv), design, rig)?;
 
         let design_source = robot_source("puma560")?;
         let fit = fit(design, &fitted_poses, &FitOptions::default()).map_err(Remedied)?;
         let files = [
             ("design.toml", FileKind::Robot, design_source.text().to_owned()),
             ("rig.toml", FileKind::Rig, Source::named_or_read("triangles", &RIGS, "rig")?.text().to_owned()),
-            (fitted_name, FileKind::Poses, fitted_shells.csv),
-            (other_name, FileKind::Poses, other_shells.csv),
+            (fitted_name, FileKind::Poses, fitted_poses_csv),
+            (other_name, FileKind::Poses, other_poses_csv),
         ];
         let written = files.iter().map(|(name, kind, text)| (self.out.join(name), *kind, text.clone()));
         write_files(&written.collect::<Vec<_>>(), false)?;
@@ -167,12 +175,13 @@ struct OnBoard {
 
 /// Puts the calibrated robot on the board; the board's own poses against the true robot's, before and after.
 fn put_on_board(bench: &mut Bench<'_>, truth: &Robot, calibrated: &Robot) -> Result<OnBoard, CommandError> {
-    let before_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES)?;
-    let applied = upload(&mut bench.link, calibrated, BOARD_POSES)?;
-    let after_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES)?;
+    let upload = Upload::new(calibrated, Admission::Calibrated, BOARD_POSES).map_err(Remedied)?;
+    let before_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES.get())?;
+    let uploaded = upload.put(&mut bench.link, &mut say_steps(BOARD_POSES)).map_err(Remedied)?;
+    let after_m = rms_kinematics(&mut bench.link, truth, BOARD_POSES.get())?;
     Ok(OnBoard {
         tool: Change { before_mm: mm_from_m(before_m), after_mm: mm_from_m(after_m) },
-        difference_um: applied.max_position_difference_um,
+        difference_um: uploaded.difference.position_m * 1e6,
     })
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use ballbar_calib::kinematics::NearlyParallel;
-use ballbar_calib::model::CalibrationVerdict;
+use ballbar_calib::model::{CalibrationVerdict, Standing};
 use clap::{Args, ValueEnum};
 use miette::Diagnostic;
 use serde::Serialize;
@@ -52,7 +52,7 @@ struct ExportReport {
     robot: String,
     format: String,
     #[serde(skip)]
-    standing: &'static str,
+    standing: Standing,
     calibrated: bool,
     /// Of the fit that wrote the robot's file.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -97,7 +97,7 @@ impl ExportArgs {
             robot: robot.name.clone(),
             format: self.format.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned()),
             standing: robot.standing(),
-            calibrated: robot.verdict().is_some(),
+            calibrated: robot.standing().is_calibrated(),
             verdict: robot.verdict(),
             out: self.out.clone(),
             text: self.out.is_none().then_some(exported.text),

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use ballbar::Chain;
 use ballbar_calib::identify::{ResidualSummary, residuals};
-use ballbar_calib::model::{Dataset, PairingId, PoseRow, Rig, Robot};
+use ballbar_calib::model::{self, Choice, Condition, Dataset, HeldOut, Rig, Robot};
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
@@ -18,11 +18,12 @@ use crate::units::{m_from_mm, mm_from_m, tidy};
 #[derive(Clone, Debug)]
 pub(super) struct HoldOut {
     text: String,
-    conditions: Vec<Condition>,
+    words: Vec<Word>,
 }
 
+/// A condition before the rig is known, whose pairings have names.
 #[derive(Clone, Debug)]
-enum Condition {
+enum Word {
     Bar(f64),
     Pairing(String),
     Set(String),
@@ -46,15 +47,15 @@ impl FromStr for HoldOut {
             let (key, value) = word.split_once('=').ok_or_else(expected)?;
             let value = value.trim();
             match key.trim() {
-                "bar" => value.parse().ok().filter(|&mm| mm > 0.0 && mm <= 1e6).map(|mm| Condition::Bar(m_from_mm(mm))),
-                "pairing" if value.contains(':') => Some(Condition::Pairing(value.to_owned())),
-                "set" if !value.is_empty() => Some(Condition::Set(value.to_owned())),
+                "bar" => value.parse().ok().filter(|&mm| mm > 0.0 && mm <= 1e6).map(|mm| Word::Bar(m_from_mm(mm))),
+                "pairing" if value.contains(':') => Some(Word::Pairing(value.to_owned())),
+                "set" if !value.is_empty() => Some(Word::Set(value.to_owned())),
                 _ => None,
             }
             .ok_or_else(expected)
         };
-        let conditions = text.split(',').map(condition).collect::<Result<_, _>>()?;
-        Ok(Self { text: text.to_owned(), conditions })
+        let words = text.split(',').map(condition).collect::<Result<_, _>>()?;
+        Ok(Self { text: text.to_owned(), words })
     }
 }
 
@@ -70,57 +71,35 @@ impl fmt::Display for HoldOut {
 
 impl HoldOut {
     /// The rows that are held out, and the others; neither is empty.
-    pub(super) fn split(&self, dataset: Dataset, rig: &Rig) -> Result<(Dataset, Dataset), CommandError> {
-        let mut pairings = Vec::new();
-        for condition in &self.conditions {
-            if let Condition::Pairing(text) = condition {
-                pairings.extend(parse_pairings(text, rig)?);
+    pub(super) fn split(&self, dataset: Dataset, rig: &Rig) -> Result<HeldOut, CommandError> {
+        let mut conditions = Vec::new();
+        for word in &self.words {
+            match word {
+                Word::Bar(bar_m) => conditions.push(Condition::Bar(*bar_m)),
+                Word::Pairing(text) => conditions.extend(parse_pairings(text, rig)?.into_iter().map(Condition::Pairing)),
+                Word::Set(set) => conditions.push(Condition::Set(set.clone())),
             }
         }
-        let known = known(&dataset, rig);
-        let (held_out, others) = dataset.split(|row| self.holds_out(row, rig, &pairings));
-        if held_out.rows.is_empty() {
-            return Err(HoldOutError::Nothing { rule: self.text.clone(), known }.into());
-        }
-        if others.rows.is_empty() {
-            return Err(HoldOutError::Everything { rule: self.text.clone(), known }.into());
-        }
-        Ok((held_out, others))
-    }
-
-    fn holds_out(&self, row: &PoseRow, rig: &Rig, pairings: &[PairingId]) -> bool {
-        /// Lengths of bars are whole millimetres.
-        const SAME_M: f64 = 1e-6;
-        self.conditions.iter().any(|condition| match condition {
-            Condition::Bar(wanted_m) => bar_m(row, rig).is_some_and(|bar_m| (bar_m - wanted_m).abs() < SAME_M),
-            Condition::Pairing(_) => pairings.contains(&row.pairing),
-            Condition::Set(set) => row.set.as_ref() == Some(set),
+        let rule = || self.text.clone();
+        dataset.hold_out(rig, &conditions).map_err(|error| match error {
+            model::HoldOutError::Nothing(choice) => HoldOutError::Nothing { rule: rule(), known: in_words(&choice, rig) }.into(),
+            model::HoldOutError::Everything(choice) => {
+                HoldOutError::Everything { rule: rule(), known: in_words(&choice, rig) }.into()
+            }
         })
     }
 }
 
-/// The bar that a row was measured with: as the file says, or the one of the rig within whose travel the length lies.
-fn bar_m(row: &PoseRow, rig: &Rig) -> Option<f64> {
-    let by_length = || {
-        let bar = rig.bar.as_ref()?;
-        let off = |mid_m: f64| (row.measurement.length_m - mid_m).abs();
-        let nearest = bar.lengths_m.iter().copied().min_by(|&a, &b| off(a).total_cmp(&off(b)))?;
-        (off(nearest) <= bar.travel_m / 2.0).then_some(nearest)
-    };
-    row.bar_m.or_else(by_length)
-}
-
-/// What could be held out, in words.
-fn known(dataset: &Dataset, rig: &Rig) -> String {
+/// What could be held out.
+fn in_words(choice: &Choice, rig: &Rig) -> String {
     let list = |mut words: Vec<String>| {
         words.sort();
         words.dedup();
         words.join(", ")
     };
-    let bars = dataset.rows.iter().filter_map(|row| bar_m(row, rig)).map(|m| tidy(mm_from_m(m)).to_string()).collect();
-    let pairings = dataset.pairings().into_iter().map(|pairing| rig.pairing_name(pairing)).collect();
-    let sets = dataset.rows.iter().filter_map(|row| row.set.clone()).collect();
-    [("bars of ", list(bars), " mm"), ("pairings ", list(pairings), ""), ("sets ", list(sets), "")]
+    let bars = choice.bars_m.iter().map(|&m| tidy(mm_from_m(m)).to_string()).collect();
+    let pairings = choice.pairings.iter().map(|&pairing| rig.pairing_name(pairing)).collect();
+    [("bars of ", list(bars), " mm"), ("pairings ", list(pairings), ""), ("sets ", list(choice.sets.clone()), "")]
         .into_iter()
         .filter(|(_, words, _)| !words.is_empty())
         .map(|(before, words, after)| format!("{before}{words}{after}"))

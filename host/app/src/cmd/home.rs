@@ -1,19 +1,16 @@
 //! `host-cal home`: tell the board where the joints stand.
 
-use ballbar::wire::Command;
-use ballbar::{JointKind, JointVector};
-use ballbar_calib::model::Robot;
+use ballbar::JointKind;
 use clap::Args;
-use miette::Diagnostic;
 use serde::Serialize;
-use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
-use super::port::{PortArgs, check_kinds};
+use super::port::PortArgs;
 use super::report::{Report, print, warn};
-use crate::board::RobotOnBoard;
+use crate::board::{HomeError, Homed, Homing};
 use crate::files::open_robot;
+use crate::remedies::Remedied;
 use crate::units::{ScreenUnit, joints_text};
 
 /// Tell the board where the joints stand (its encoders count from there)
@@ -34,16 +31,6 @@ pub(super) struct HomeArgs {
     output: OutputArgs,
 }
 
-#[derive(Debug, Error, Diagnostic)]
-enum HomeError {
-    #[error("the board holds no parameters, so it does not know how its encoders count")]
-    #[diagnostic(help("Upload a robot first: host-cal apply PORT --robot robot.toml"))]
-    NoParameters,
-    #[error("joint {joint}: {counts:.0} counts are more than the board can hold")]
-    #[diagnostic(help("Is the value in degrees or millimetres? Nothing was changed."))]
-    OutOfRange { joint: usize, counts: f64 },
-}
-
 #[derive(Serialize)]
 struct HomeReport {
     q: Vec<f64>,
@@ -61,44 +48,25 @@ impl HomeArgs {
         }
         let limits = self.robot.as_deref().map(open_robot).transpose()?;
         let mut link = self.port.connect()?;
-        let (robot, _) = RobotOnBoard::read(&mut link)?.ok_or(HomeError::NoParameters)?;
-        let kinds = robot.kinds();
-        if self.q.len() != kinds.len() {
-            return Err(ListError::JointValues { flag: "--q", found: self.q.len(), expected: kinds.len() }.into());
-        }
-        let mut q = JointVector::zero();
-        for ((place, &value), &kind) in q.as_array_mut().iter_mut().zip(&self.q).zip(kinds) {
-            *place = ScreenUnit::from(kind).to_si(value);
-        }
-        let beyond_limits = match &limits {
-            Some(limits) => Some(beyond_limits(limits, kinds, &q)?),
-            None => None,
-        };
-        let counts = whole_counts(&robot.encoders().counts(&q)[..kinds.len()])?;
-        for (joint, &counts) in counts.iter().enumerate() {
-            link.act(Command::PresetEncoder { joint: joint as u8, counts })?;
-        }
+        let homing = Homing::begin(&mut link).map_err(Remedied)?;
+        // Of a value too many no kind is known; it is refused.
+        let kinds = homing.kinds().iter().map(|&kind| ScreenUnit::from(kind)).chain(std::iter::repeat(ScreenUnit::One));
+        let q: Vec<f64> = kinds.zip(&self.q).map(|(unit, &value)| unit.to_si(value)).collect();
+        let Homed { kinds, counts, beyond_limits } = homing.at(&q, limits.as_ref()).map_err(home_error)?;
+        let beyond_limits = beyond_limits.map(|joints| joints.iter().map(ToString::to_string).collect::<Vec<_>>());
         for beyond in beyond_limits.iter().flatten() {
             warn(&format!("{beyond}: is the robot really there?"));
         }
-        print(&HomeReport { q: self.q.clone(), counts, beyond_limits, kinds: kinds.to_vec() }, self.output.json)?;
+        print(&HomeReport { q: self.q.clone(), counts, beyond_limits, kinds }, self.output.json)?;
         Ok(Outcome::Good)
     }
 }
 
-/// Joints beyond the limits of a robot, which has to be the board's.
-fn beyond_limits(robot: &Robot, kinds: &[JointKind], q: &JointVector<f64>) -> Result<Vec<String>, CommandError> {
-    check_kinds(robot, kinds)?;
-    Ok(robot.beyond_limits(q.as_array()).map(|beyond| beyond.to_string()).collect())
-}
-
-fn whole_counts(counts: &[f64]) -> Result<Vec<i32>, HomeError> {
-    let whole = |(i, &counts): (usize, &f64)| {
-        let rounded = counts.round();
-        let fits = (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&rounded);
-        if fits { Ok(rounded as i32) } else { Err(HomeError::OutOfRange { joint: i + 1, counts }) }
-    };
-    counts.iter().enumerate().map(whole).collect()
+fn home_error(error: HomeError) -> CommandError {
+    match error {
+        HomeError::Joints { found, expected } => ListError::JointValues { flag: "--q", found, expected }.into(),
+        error => Remedied(error).into(),
+    }
 }
 
 impl Report for HomeReport {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ballbar_calib::model::{Dataset, PairingId, Rig, Robot, RowWarning};
+use ballbar_calib::model::{Dataset, HeldOut, PairingId, Rig, Robot, RowWarning};
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
@@ -85,8 +85,8 @@ impl MeasuredArgs {
         let (held_out, dataset) = match &self.hold_out {
             None => (None, dataset),
             Some(rule) => {
-                let (held_out, others) = rule.split(dataset, &rig)?;
-                (Some((rule.clone(), held_out)), others)
+                let HeldOut { apart, others } = rule.split(dataset, &rig)?;
+                (Some((rule.clone(), apart)), others)
             }
         };
         Ok(Measured { robot, robot_source, rig, rig_name, dataset, held_out, warnings })

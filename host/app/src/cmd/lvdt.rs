@@ -2,21 +2,21 @@
 
 use std::io::{IsTerminal, stdin};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use ballbar::wire::{Answer, Command, Event, Refusal, StreamSelection};
-use ballbar::{LVDT_COEFFICIENTS, SettledPose, StillnessCriteria};
+use ballbar::{LVDT_COEFFICIENTS, SettledPose};
 use clap::Args;
-use miette::Diagnostic;
 use serde::Serialize;
-use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
 use super::report::{Report, print, warn};
-use crate::board::{BoardError, BoardLink, LvdtPoint, Refusals, RobotOnBoard, StreamLosses, check_lvdt_points, fit_lvdt};
-use crate::deadline::StopFlag;
+use crate::board::{
+    Implausible, LengthSet, LengthSetter, LvdtError, LvdtPoint, Refusals, StreamLosses, check_lvdt_points, fit_lvdt,
+    measure_lvdt, store_lvdt,
+};
+use crate::remedies::Remedied;
 use crate::terminal::out::{ask, tell};
 use crate::terminal::table::{Columns, fixed};
 use crate::terminal::{EndRequest, INTERRUPTED, typed_lines};
@@ -52,25 +52,8 @@ pub(super) struct LvdtArgs {
     output: OutputArgs,
 }
 
-#[derive(Debug, Error, Diagnostic)]
-enum LvdtError {
-    #[error("the board holds no parameters, of which the curve is a part")]
-    #[diagnostic(help("Upload a robot first: host-cal apply PORT --robot robot.toml"))]
-    NoParameters,
-    #[error("ended before all lengths were measured: {found} of {wanted}")]
-    #[diagnostic(help("Nothing was changed on the board."))]
-    Ended { found: usize, wanted: usize },
-    #[error("the board has stopped streaming")]
-    #[diagnostic(help("Was it started again? Nothing was changed on the board."))]
-    NotStreaming,
-}
-
 /// From one look at the keyboard to the next.
 const LOOK: Duration = Duration::from_millis(50);
-/// After so much silence the board is asked how it is.
-const SILENCE: Duration = Duration::from_secs(1);
-/// How long an arm that moves is waited for.
-const STORE_PATIENCE: Duration = Duration::from_secs(10);
 
 #[derive(Serialize)]
 struct LvdtReport {
@@ -102,44 +85,43 @@ impl LvdtArgs {
         }
         check_lvdt_points(self.lengths.len(), usize::from(self.degree))?;
         let mut link = self.port.connect()?;
-        RobotOnBoard::read(&mut link)?.ok_or(LvdtError::NoParameters)?;
         let end = EndRequest::listen();
-        link.heed(end.stop_flag());
-        let measured = self.measure(&mut link, &end);
-        // Whatever came of it, the board is left as it is after its start.
-        let left = link.end_stream();
-        link.heed(&StopFlag::default());
-        let left = left.and_then(|_| link.act(Command::SetStillness(StillnessCriteria::default())));
-        let poses = measured?;
-        left?;
+        let mut person = Person {
+            lengths_mm: &self.lengths,
+            typed: stdin().is_terminal().then(typed_lines),
+            end: &end,
+            refusals: Refusals::default(),
+        };
+        let hold_us = self.hold_ms.saturating_mul(1_000);
+        let poses = measure_lvdt(&mut link, self.lengths.len(), hold_us, end.stop_flag(), &mut person);
+        let poses = poses.map_err(|error| lvdt_error(error, &end))?;
         let point = |(&length_mm, pose): (&f64, &SettledPose)| LvdtPoint {
             displacement_m: m_from_mm(length_mm - self.bar),
             code: pose.code_mean,
         };
         let points: Vec<LvdtPoint> = self.lengths.iter().zip(&poses).map(point).collect();
-        let (curve, residuals_m) = fit_lvdt(&points, usize::from(self.degree))?;
-
-        let squares: f64 = residuals_m.iter().map(|m| m * m).sum();
+        let fit = fit_lvdt(&points, usize::from(self.degree))?;
+        let tolerance_m = m_from_mm(self.tolerance_mm);
         let line = |((&length_mm, pose), &m): ((&f64, &SettledPose), &f64)| PointLine {
             length_mm,
             code: pose.code_mean,
             code_std: pose.code_std,
             residual_mm: mm_from_m(m),
         };
-        let max_abs_mm = mm_from_m(residuals_m.iter().fold(0.0, |max: f64, m| max.max(m.abs())));
-        let (outcome, stored) = match max_abs_mm <= self.tolerance_mm {
+        let (outcome, stored) = match fit.is_within(tolerance_m) {
             false => ("not stored: too far off", Ok(())),
             true if self.dry_run => ("not stored: dry run", Ok(())),
-            true => match store(&mut link, curve) {
+            true => match store_lvdt(&mut link, &fit, tolerance_m) {
                 Ok(()) => ("stored", Ok(())),
                 Err(error) => ("not stored: see the error", Err(error)),
             },
         };
+        let curve = fit.curve;
         let report = LvdtReport {
             degree: self.degree,
-            points: self.lengths.iter().zip(&poses).zip(&residuals_m).map(line).collect(),
-            rms_mm: mm_from_m((squares / residuals_m.len() as f64).sqrt()),
-            max_abs_mm,
+            points: self.lengths.iter().zip(&poses).zip(&fit.residuals_m).map(line).collect(),
+            rms_mm: mm_from_m(fit.rms_m()),
+            max_abs_mm: mm_from_m(fit.largest_m()),
             code_min: curve.code_min,
             code_max: curve.code_max,
             coefficients_mm: curve.coefficients_m.map(|m| mm_from_m(f64::from(m))),
@@ -148,50 +130,43 @@ impl LvdtArgs {
         };
         // What was measured by hand is shown, whatever became of it.
         print(&report, self.output.json)?;
-        stored?;
-        Ok(if max_abs_mm <= self.tolerance_mm { Outcome::Good } else { Outcome::Doubtful })
+        stored.map_err(Remedied)?;
+        Ok(if fit.is_within(tolerance_m) { Outcome::Good } else { Outcome::Doubtful })
     }
+}
 
-    /// Ended before its time, by Ctrl-C or because stdin was closed.
-    fn ended(&self, found: usize, end: &EndRequest) -> CommandError {
-        let error = CommandError::from(LvdtError::Ended { found, wanted: self.lengths.len() });
-        if end.is_made() { CommandError { exit_code: INTERRUPTED, ..error } } else { error }
-    }
+/// Ended before its time, by Ctrl-C or because stdin was closed, among the rest.
+fn lvdt_error(error: LvdtError, end: &EndRequest) -> CommandError {
+    let is_interrupted = matches!(error, LvdtError::Ended { .. }) && end.is_made();
+    let error = CommandError::from(Remedied(error));
+    if is_interrupted { CommandError { exit_code: INTERRUPTED, ..error } } else { error }
+}
 
-    /// Takes one settled pose for each length.
-    fn measure(&self, link: &mut BoardLink, end: &EndRequest) -> Result<Vec<SettledPose>, CommandError> {
-        let typed = stdin().is_terminal().then(typed_lines);
-        let mut refusals = Refusals::default();
-        // The arm may do what it likes; only the LVDT has to stand.
-        let criteria = StillnessCriteria {
-            hold_us: self.hold_ms.saturating_mul(1_000),
-            band_counts: u16::MAX,
-            ..StillnessCriteria::default()
-        };
-        let mut poses: Vec<SettledPose> = Vec::new();
-        for &length_mm in &self.lengths {
-            tell(&format!("set the bar to {length_mm} mm and hold it still"));
-            let ended = || Err(self.ended(poses.len(), end));
-            if typed.as_ref().is_some_and(|typed| !is_entered(typed, end)) {
-                return ended();
-            }
-            // Asked for anew, so that stillness before now does not count.
-            let started = link
-                .act(Command::SetStillness(criteria))
-                .and_then(|()| link.start_stream(StreamSelection { settled: true, ..StreamSelection::default() }));
-            if matches!(started, Err(BoardError::Stopped)) {
-                return ended();
-            }
-            started?;
-            // Nobody says when the next length is set: a code that has not moved is still that of the last one.
-            let old_code = poses.last().map(|pose| pose.code_mean).filter(|_| typed.is_none());
-            let is_new =
-                |pose: &SettledPose| old_code.is_none_or(|old| (pose.code_mean - old).abs() > f64::from(criteria.band_codes));
-            let Some(pose) = next_settled(link, end, &mut refusals, is_new)? else { return ended() };
-            tell(&format!("  code {:.1} ± {:.1} over {} samples", pose.code_mean, pose.code_std, pose.samples));
-            poses.push(pose);
+/// Whoever sets the bar, at a terminal or somewhere else.
+struct Person<'a> {
+    lengths_mm: &'a [f64],
+    /// Lines typed, where there is a terminal.
+    typed: Option<Receiver<String>>,
+    end: &'a EndRequest,
+    refusals: Refusals,
+}
+
+impl LengthSetter for Person<'_> {
+    fn set(&mut self, number: usize) -> LengthSet {
+        tell(&format!("set the bar to {} mm and hold it still", self.lengths_mm[number]));
+        match &self.typed {
+            None => LengthSet::Unsaid,
+            Some(typed) if is_entered(typed, self.end) => LengthSet::Now,
+            Some(_) => LengthSet::Never,
         }
-        Ok(poses)
+    }
+
+    fn taken(&mut self, pose: &SettledPose) {
+        tell(&format!("  code {:.1} ± {:.1} over {} samples", pose.code_mean, pose.code_std, pose.samples));
+    }
+
+    fn refused(&mut self, reason: Implausible) {
+        self.refusals.note(reason).iter().for_each(|words| warn(words));
     }
 }
 
@@ -209,56 +184,6 @@ fn is_entered(typed: &Receiver<String>, end: &EndRequest) -> bool {
     }
     tell("");
     false
-}
-
-/// The next pose that stands and is new; `None` when the user ends instead. A board that falls silent is asked how it is.
-fn next_settled(
-    link: &mut BoardLink,
-    end: &EndRequest,
-    refusals: &mut Refusals,
-    is_new: impl Fn(&SettledPose) -> bool,
-) -> Result<Option<SettledPose>, CommandError> {
-    let mut heard = Instant::now();
-    while !end.is_made() {
-        match link.next_frame()?.map(|frame| frame.message) {
-            Some(Ok(stream)) => {
-                heard = Instant::now();
-                if let Event::Settled(pose) = stream.event
-                    && is_new(&pose)
-                {
-                    return Ok(Some(pose));
-                }
-            }
-            Some(Err(reason)) => refusals.note(reason).iter().for_each(|words| warn(words)),
-            None if heard.elapsed() >= SILENCE => {
-                heard = Instant::now();
-                match link.request(Command::Status) {
-                    Ok(Answer::Status(status)) if status.streaming.is_none() => return Err(LvdtError::NotStreaming.into()),
-                    Ok(_) | Err(BoardError::Stopped) => {}
-                    Err(error) => return Err(error.into()),
-                }
-            }
-            None => {}
-        }
-    }
-    Ok(None)
-}
-
-/// Stages the curve and stores it; while the arm moves, the store is tried again for some seconds.
-fn store(link: &mut BoardLink, curve: ballbar::LvdtCurve) -> Result<(), CommandError> {
-    link.act(Command::Discard)?;
-    let Answer::Staged { crc } = link.request(Command::SetLvdt(curve))? else {
-        return Err(BoardError::WrongAnswer { command: "set LVDT" }.into());
-    };
-    let began = Instant::now();
-    loop {
-        match link.act(Command::Commit { crc }) {
-            Err(BoardError::Refused { refusal: Refusal::Moving, .. }) if began.elapsed() < STORE_PATIENCE => {
-                std::thread::sleep(Duration::from_millis(200));
-            }
-            stored => return Ok(stored?),
-        }
-    }
 }
 
 impl Report for LvdtReport {

@@ -1,10 +1,7 @@
 //! Arguments and habits that the commands with a board have in common.
 
-use ballbar::{JointKind, StillnessCriteria};
-use ballbar_calib::model::Robot;
+use ballbar::StillnessCriteria;
 use clap::Args;
-use miette::Diagnostic;
-use thiserror::Error;
 
 use super::outcome::CommandError;
 use crate::board::{BAUD, BoardLink};
@@ -24,25 +21,6 @@ impl PortArgs {
     pub(super) fn connect(&self) -> Result<BoardLink, CommandError> {
         Ok(BoardLink::connect(&self.port, self.baud)?)
     }
-}
-
-/// A robot's file that is of another robot than the board's.
-#[derive(Debug, Error, Diagnostic)]
-#[error("{robot} has {found} joints, the board's robot {expected}, or joints of other kinds")]
-#[diagnostic(help("Give the robot that the board holds: `host-cal status PORT` names it."))]
-pub(super) struct OtherRobot {
-    robot: String,
-    found: usize,
-    expected: usize,
-}
-
-/// A robot has the joints of the board's.
-pub(super) fn check_kinds(robot: &Robot, on_board: &[JointKind]) -> Result<(), OtherRobot> {
-    let kinds = robot.chain.joint_kinds();
-    if kinds == on_board {
-        return Ok(());
-    }
-    Err(OtherRobot { robot: robot.source.as_str().to_owned(), found: kinds.len(), expected: on_board.len() })
 }
 
 /// When the arm stands still.

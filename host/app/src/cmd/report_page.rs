@@ -1,11 +1,10 @@
 //! `host-cal report`: a calibration as one page for people.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
 use ballbar_calib::identify::{FitOptions, fit, remarks};
-use ballbar_calib::model::{Dataset, PoseRow};
+use ballbar_calib::model::Dataset;
 use clap::Args;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -153,15 +152,9 @@ impl ReportArgs {
 
     /// The files of `--validate`, and what to call them.
     fn others(&self, measured: &Measured) -> Result<Vec<(String, Dataset)>, CommandError> {
-        let key = |row: &PoseRow| {
-            let values = row.measurement.q.as_array().iter().chain([&row.measurement.length_m]);
-            (row.pairing, values.map(|value| value.to_bits()).collect::<Vec<_>>())
-        };
-        let fitted: HashSet<_> = measured.dataset.rows.iter().map(key).collect();
         let read = |path: &PathBuf| {
             let rows = read_poses([poses_of(path)?.as_path()], &measured.robot, &measured.rig)?;
-            let seen = rows.rows.iter().filter(|row| fitted.contains(&key(row))).count();
-            match (rows.rows.len(), seen) {
+            match (rows.rows.len(), rows.shared_rows(&measured.dataset)) {
                 (0, _) => Err(EmptyError(path.clone()).into()),
                 (_, 0) => Ok((path.display().to_string(), rows)),
                 (of, seen) => Err(SeenError { path: path.clone(), seen, of }.into()),

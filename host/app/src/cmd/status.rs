@@ -1,20 +1,16 @@
 //! `host-cal status`: how the board is.
 
-use std::thread::sleep;
-use std::time::{Duration, Instant};
-
 use ballbar::Stillness;
 use ballbar::wire::{Answer, BoardHello, Check, Command, ResetReason, SelfTest, SetIdentity, SlotState, Status};
 use clap::Args;
-use miette::Diagnostic;
 use serde::Serialize;
-use thiserror::Error;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
 use super::report::{Report, print};
-use crate::board::{BoardError, BoardLink};
+use crate::board::{BoardError, reset};
+use crate::remedies::Remedied;
 use crate::terminal::table::Columns;
 use crate::text::one_line;
 
@@ -32,17 +28,6 @@ pub(super) struct StatusArgs {
     #[command(flatten)]
     output: OutputArgs,
 }
-
-/// A board that answered a reset and did not carry it out, or did not come back.
-#[derive(Debug, Error, Diagnostic)]
-#[error("{port}: the board was asked to reset and did not start anew within {} s", RESET_PATIENCE.as_secs())]
-#[diagnostic(help("Switch it off and on."))]
-struct NotReset {
-    port: String,
-}
-
-const RESET_LOOK: Duration = Duration::from_millis(100);
-const RESET_PATIENCE: Duration = Duration::from_secs(20);
 
 #[derive(Serialize)]
 struct StatusReport {
@@ -130,7 +115,7 @@ impl StatusArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let mut link = self.port.connect()?;
         if self.reset {
-            link = self.reset(link)?;
+            link = reset(link, self.port.baud).map_err(Remedied)?;
         }
         let Answer::Status(status) = link.request(Command::Status)? else {
             return Err(BoardError::WrongAnswer { command: "status" }.into());
@@ -141,26 +126,6 @@ impl StatusArgs {
         let report = StatusReport::new(&self.port.port, link.hello(), &status, &self_test);
         print(&report, self.output.json)?;
         Ok(if report.self_test.iter().all(|test| test.passed) { Outcome::Good } else { Outcome::Doubtful })
-    }
-}
-
-impl StatusArgs {
-    /// Resets the board; returns when it has started anew.
-    fn reset(&self, mut link: BoardLink) -> Result<BoardLink, CommandError> {
-        let uptime_us = link.hello().uptime_us;
-        link.act(Command::Reset)?;
-        drop(link);
-        let began = Instant::now();
-        while began.elapsed() < RESET_PATIENCE {
-            sleep(RESET_LOOK);
-            // A board that is just starting does not answer, and a port may be away for a moment.
-            if let Ok(link) = self.port.connect()
-                && link.hello().uptime_us < uptime_us
-            {
-                return Ok(link);
-            }
-        }
-        Err(NotReset { port: self.port.port.clone() }.into())
     }
 }
 

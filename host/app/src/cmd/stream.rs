@@ -20,10 +20,11 @@ use watch::Watch;
 
 use super::inputs::{OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
-use super::port::{PortArgs, StillnessArgs, check_kinds};
+use super::port::{PortArgs, StillnessArgs};
 use super::report::{Report, print, warn};
-use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
+use crate::board::{BoardLink, RobotOnBoard, StreamLosses, check_kinds};
 use crate::files::{open_rig, open_robot};
+use crate::remedies::Remedied;
 use crate::session::{
     Connection, DescriptionError, LockError, LogError, PoseFileError, ROBOT_NAME, RecordError, Recorder, Run, SessionLock,
 };
@@ -149,7 +150,7 @@ impl StreamArgs {
             return Err(StreamError::NoParameters.into());
         }
         if let (Some(limits), Some((robot, _))) = (&limits, &robot) {
-            check_kinds(limits, robot.kinds())?;
+            check_kinds(limits, robot.kinds()).map_err(Remedied)?;
         }
         let recorder = self.recorder(&link, robot.as_ref(), connection.clone())?;
         let model = self.model(robot.as_ref().map(|(robot, _)| robot))?;

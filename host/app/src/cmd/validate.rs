@@ -1,7 +1,7 @@
 //! `host-cal validate`: residuals of poses that a fit has not seen.
 
 use ballbar_calib::identify::{ResidualSummary, by_pairing, residuals};
-use ballbar_calib::model::CalibrationVerdict;
+use ballbar_calib::model::{CalibrationVerdict, Standing};
 use clap::Args;
 use serde::Serialize;
 
@@ -35,7 +35,7 @@ struct ValidateReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     verdict: Option<CalibrationVerdict>,
     #[serde(skip)]
-    standing: &'static str,
+    standing: Standing,
     /// The rule of --hold-out.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<String>,
@@ -66,7 +66,7 @@ impl ValidateArgs {
         let summary = ResidualSummary::new(&residuals);
         let rms_mm = mm_from_m(summary.rms_m);
         ValidateReport {
-            calibrated: robot.verdict().is_some(),
+            calibrated: robot.standing().is_calibrated(),
             verdict: robot.verdict(),
             standing: robot.standing(),
             robot: robot.name,

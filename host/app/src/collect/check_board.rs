@@ -1,10 +1,24 @@
 //! Is the board's robot the plan's?
 
 use ballbar::Coupling;
+use ballbar::wire::{Answer, Command};
 use ballbar_calib::model::Robot;
 
 use super::errors::CollectError;
-use crate::board::RobotOnBoard;
+use crate::board::{BoardError, BoardLink, RobotOnBoard};
+
+/// Asks the board for its robot, which has to be the plan's and to know where it is. Returns the frame of the reply as well, for a log.
+///
+/// # Errors
+/// [`CollectError::Board`], [`CollectError::NoParameters`], and as [`check_board`].
+pub fn read_board(link: &mut BoardLink, robot: &Robot) -> Result<(RobotOnBoard, Vec<u8>), CollectError> {
+    let (on_board, frame) = RobotOnBoard::read(link)?.ok_or(CollectError::NoParameters)?;
+    let Answer::Status(status) = link.request(Command::Status)? else {
+        return Err(BoardError::WrongAnswer { command: "status" }.into());
+    };
+    check_board(robot, &on_board, on_board.is_homed_by(&status))?;
+    Ok((on_board, frame))
+}
 
 /// A board counts as the plan's robot does, and knows where it is.
 ///

@@ -40,6 +40,10 @@ pub enum CollectError {
         /// For how long.
         seconds: f64,
     },
+    /// The board has no robot.
+    #[error("the board holds no parameters, so it cannot tell joint angles or lengths")]
+    #[diagnostic(help("Tell it the robot first: host-cal apply PORT --robot robot.toml --uncalibrated"))]
+    NoParameters,
     /// Encoders that do not know where they are.
     #[error("the board's encoders are not homed, so nothing tells where the robot is")]
     #[diagnostic(help("Drive the robot to a known posture and tell it: host-cal home PORT --q …"))]

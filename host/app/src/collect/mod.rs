@@ -21,6 +21,7 @@ mod go;
 mod inspect;
 mod lag;
 mod ledger;
+mod mover;
 mod now;
 mod operator;
 mod repeat;
@@ -28,16 +29,17 @@ mod shell_programs;
 mod track;
 
 pub use board_watch::{BoardWatch, Stand, View};
-pub use check_board::check_board;
+pub use check_board::{check_board, read_board};
 pub use collector::{CollectOptions, Collector, Ended, Summary};
 pub use errors::CollectError;
 pub use follow::{Guide, ShellPrograms};
 pub use lag::{Lag, estimate_lag, remove_lag};
 pub use ledger::{Ledger, RowState, shells};
+pub use mover::Mover;
 pub use now::{Goal, Now};
 pub use operator::{Event, Measured, Operator, Unattended, Wish};
 pub use repeat::Repeat;
-pub use shell_programs::{ProgramOptions, ShellProgram, plan_programs};
+pub use shell_programs::{ProgramOptions, Programs, ShellProgram, plan_programs};
 pub use track::{MovingPose, TrackOptions};
 
 use ballbar::{JointKind, JointVector};

@@ -1,11 +1,16 @@
-//! A plan as programs of a controller: for each shell one that brings the robot there, without the bar, and one that measures.
+//! A plan as programs of a controller: for each shell one that brings the robot there, without the bar, and one that measures. Their
+//! files are kept in the session.
+
+use std::path::Path;
 
 use ballbar_calib::plan::{CheckedPlan, PlanRow, RowKind};
 
+use super::follow::ShellPrograms;
 use super::ledger::shells;
+use crate::files::{FilesError, make_folder, write_atomically};
 use crate::robot_link::JointSpeed;
-use crate::robot_link::program::{ControllerSetup, Program, ProgramStep};
-use crate::session::Connection;
+use crate::robot_link::program::{ControllerSetup, Dialect, Program, ProgramError, ProgramFile, ProgramStep, write_program};
+use crate::session::{Connection, PROGRAMS_NAME};
 
 /// How a plan's programs go over its rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,4 +68,45 @@ pub fn plan_programs(plan: &CheckedPlan<'_>, options: &ProgramOptions) -> Vec<Sh
         }
     };
     (1..).zip(shells(rows)).map(shell_program).collect()
+}
+
+/// The programs of all shells of a plan in a controller's language.
+pub struct Programs {
+    /// What they are called, in the order of the plan.
+    pub names: Vec<ShellPrograms>,
+    files: Vec<ProgramFile>,
+}
+
+impl Programs {
+    /// Writes nothing yet.
+    ///
+    /// # Errors
+    /// [`ProgramError`] where the language cannot hold one of them.
+    pub fn of_plan(plan: &CheckedPlan<'_>, dialect: Dialect, options: &ProgramOptions) -> Result<Self, ProgramError> {
+        let mut files = Vec::new();
+        let mut text = |program: &Program| -> Result<String, ProgramError> {
+            let written = write_program(dialect, program)?;
+            let first = written.first().map_or_else(String::new, |file| file.name.clone());
+            files.extend(written);
+            Ok(first)
+        };
+        let mut names = Vec::new();
+        for shell in plan_programs(plan, options) {
+            names.push(ShellPrograms { approach: text(&shell.approach)?, measure: text(&shell.measure)? });
+        }
+        Ok(Self { names, files })
+    }
+
+    /// Writes them into the session's folder of programs, which is made where it is missing.
+    ///
+    /// # Errors
+    /// [`FilesError`].
+    pub fn write(&self, session: &Path) -> Result<(), FilesError> {
+        let folder = session.join(PROGRAMS_NAME);
+        make_folder(&folder)?;
+        for ProgramFile { name, text } in &self.files {
+            write_atomically(&folder.join(name), text)?;
+        }
+        Ok(())
+    }
 }

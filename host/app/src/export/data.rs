@@ -58,7 +58,7 @@ impl<'a> RobotData<'a> {
         };
         Self {
             name: &robot.name,
-            is_calibrated: robot.verdict().is_some(),
+            is_calibrated: robot.standing().is_calibrated(),
             model: MODEL,
             links: (0..=chain.joints()).filter_map(|i| chain.link(i)).map(link).collect(),
             joints: joints.map(joint).collect(),

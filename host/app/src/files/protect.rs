@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::kind::{FileKind, Found, recognise};
 use super::reading;
-use crate::session;
+use super::session_names::{DESCRIPTION_NAME, FILE_NAMES, LOG_NAME, PROGRAMS_NAME};
 
 /// Why a file is not replaced.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -72,12 +72,11 @@ pub(super) fn check(given: &Path, followed: &Path, written: FileKind, force: boo
 fn is_of_session(path: &Path) -> bool {
     let Some(name) = path.file_name() else { return false };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let is_session =
-        |folder: &Path| [session::LOG_NAME, session::DESCRIPTION_NAME].iter().any(|name| folder.join(name).is_file());
-    let is_programs = folder.file_name().is_some_and(|name| name.eq_ignore_ascii_case(session::PROGRAMS_NAME));
+    let is_session = |folder: &Path| [LOG_NAME, DESCRIPTION_NAME].iter().any(|name| folder.join(name).is_file());
+    let is_programs = folder.file_name().is_some_and(|name| name.eq_ignore_ascii_case(PROGRAMS_NAME));
     if is_programs && folder.parent().is_some_and(is_session) {
         return true;
     }
     let is_own = |own: &&str| name.eq_ignore_ascii_case(own) || is_same_file(folder.join(own), path).unwrap_or(false);
-    is_session(folder) && session::FILE_NAMES.iter().any(is_own)
+    is_session(folder) && FILE_NAMES.iter().any(is_own)
 }

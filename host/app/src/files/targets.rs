@@ -1,6 +1,6 @@
 //! `targets.csv`: where a tool is to go, as joint vectors of a controller, as poses, or as both.
 
-use ballbar::{Pose, Vector3};
+use ballbar::{JointKind, JointVector, Pose, Vector3};
 use ballbar_calib::kinematics::{Compensation, Goal, from_link, link_angles};
 use ballbar_calib::model::Robot;
 
@@ -66,6 +66,16 @@ pub fn pose_as_written(pose: &Pose<f64>) -> Pose<f64> {
     let rounded = |value: f64, decimals: i32| (value * 10_f64.powi(decimals)).round() / 10_f64.powi(decimals);
     let translation_m = pose.translation_m.map(|m| m_from_mm(rounded(mm_from_m(m), MM_DECIMALS as i32)));
     from_link(translation_m, link_angles(&pose.rotation).map(|rad| rounded(rad.to_degrees(), DEG_DECIMALS as i32).to_radians()))
+}
+
+/// Joints as a file of commands has them: to the nanodegree and the picometre.
+pub fn joints_as_written(kinds: &[JointKind], mut q: JointVector<f64>) -> JointVector<f64> {
+    const PER_UNIT: f64 = 1e9;
+    for (value, &kind) in q.as_array_mut().iter_mut().zip(kinds) {
+        let unit = ScreenUnit::from(kind);
+        *value = unit.to_si((unit.from_si(*value) * PER_UNIT).round() / PER_UNIT);
+    }
+    q
 }
 
 /// Commands as a file: the target's line, joints to command, the pose that the controller believes to reach by them, and the

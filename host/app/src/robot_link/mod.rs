@@ -10,6 +10,7 @@
 //! | [`program`] | files for controllers that take no moves on line |
 
 mod dashboard;
+mod open;
 mod patience;
 pub mod program;
 mod rtde;
@@ -28,6 +29,7 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use crate::deadline::StopFlag;
+pub use open::{ControllerAt, OpenError, open};
 pub use patience::Patience;
 pub use speed::JointSpeed;
 

@@ -42,6 +42,31 @@ pub struct Compensation {
     pub pose_leads_to_q: bool,
 }
 
+/// A joint that goes far from where the controller would have it: farther than any calibration moves one, away from singular postures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FarTurn {
+    /// Number of the joint, from 1.
+    pub joint: usize,
+    /// Its kind.
+    pub kind: JointKind,
+    /// How far it goes, radians or metres.
+    pub way: f64,
+}
+
+impl Compensation {
+    /// The joint that goes farthest from where the controller would have it, if that is more than five degrees or fifty millimetres.
+    pub fn far_turn(&self, kinds: &[JointKind]) -> Option<FarTurn> {
+        const FAR_RAD: f64 = std::f64::consts::PI / 36.0;
+        const FAR_M: f64 = 0.05;
+        let ways = self.q.as_array().iter().zip(self.nominal_q.as_array()).map(|(new, old)| (new - old).abs());
+        let joints = ways.zip(kinds).enumerate().map(|(i, (way, &kind))| {
+            let far = if kind == JointKind::Revolute { FAR_RAD } else { FAR_M };
+            (way / far, FarTurn { joint: i + 1, kind, way })
+        });
+        joints.filter(|(share, _)| *share > 1.0).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, farthest)| farthest)
+    }
+}
+
 /// How a target is given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
@@ -174,6 +199,26 @@ impl Compensator {
             before: from_target(&nominal_q),
             left: from_target(&q),
         })
+    }
+
+    /// As [`Compensator::compensate`], for targets one after the other: the arm comes to each from the one before it that has a command, to
+    /// the first from `start`.
+    pub fn compensate_all<'g>(
+        &self,
+        goals: impl IntoIterator<Item = &'g Goal>,
+        start: JointVector<f64>,
+        rounded: impl Fn(JointVector<f64>) -> JointVector<f64>,
+        written: impl Fn(&Pose<f64>) -> Pose<f64>,
+    ) -> Vec<Result<Compensation, Unreached>> {
+        let mut before = start;
+        let one = |goal: &Goal| {
+            let found = self.compensate(goal, &before, &rounded, &written);
+            if let Ok(found) = &found {
+                before = found.nominal_q;
+            }
+            found
+        };
+        goals.into_iter().map(one).collect()
     }
 
     /// Joints of the nominal model for a pose, within limits, nearest to others.

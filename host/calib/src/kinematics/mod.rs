@@ -12,7 +12,7 @@ mod opw;
 mod skeleton;
 
 pub use branches::{Branches, InverseKinematics, Thoroughness};
-pub use compensation::{Compensation, Compensator, Goal, NothingAllowed, Unreached};
+pub use compensation::{Compensation, Compensator, FarTurn, Goal, NothingAllowed, Unreached};
 pub use dh::{Convention, DhRow, DhTable, NearlyParallel};
 pub use frames::{apart, compose, from_link, inverse, link_angles};
 pub use opw::Opw;

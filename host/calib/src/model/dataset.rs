@@ -106,6 +106,14 @@ pub struct Dataset {
     pub files: Vec<String>,
 }
 
+impl PoseRow {
+    /// Equal for rows with the same ends and measured values.
+    fn key(&self) -> (PairingId, Vec<u64>) {
+        let values = self.measurement.q.as_array().iter().chain([&self.measurement.length_m]);
+        (self.pairing, values.map(|value| value.to_bits()).collect())
+    }
+}
+
 /// Something about a row that may be a mistake but is no reason to refuse it.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
@@ -238,6 +246,12 @@ impl Dataset {
         format!("{}:{}", self.files[self.rows[row].file], self.rows[row].line)
     }
 
+    /// How many of these rows stand, measured values and all, in another dataset too.
+    pub fn shared_rows(&self, other: &Self) -> usize {
+        let others: HashSet<_> = other.rows.iter().map(PoseRow::key).collect();
+        self.rows.iter().filter(|row| others.contains(&row.key())).count()
+    }
+
     /// Rows that may be mistakes: beyond joint limits, beyond the bar's travel, or repeated. Row indices from 0.
     pub fn warnings(&self, robot: &Robot, rig: &Rig) -> Vec<(usize, RowWarning)> {
         let mut warnings = Vec::new();
@@ -252,8 +266,7 @@ impl Dataset {
             if rig.bar.as_ref().is_some_and(|bar| !bar.reaches(row.measurement.length_m)) {
                 warnings.push((i, RowWarning::BeyondTravel));
             }
-            let bits: Vec<u64> = q.iter().chain([&row.measurement.length_m]).map(|value| value.to_bits()).collect();
-            if !seen.insert((row.pairing, bits)) {
+            if !seen.insert(row.key()) {
                 warnings.push((i, RowWarning::Repeated));
             }
         }

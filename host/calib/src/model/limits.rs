@@ -4,7 +4,6 @@ use std::fmt;
 
 use ballbar::JointKind;
 
-use super::robot::Robot;
 use crate::units::{ScreenUnit, tidy};
 
 /// Limits of a joint's encoder output q, radians or metres.
@@ -41,15 +40,6 @@ pub struct BeyondLimits {
     pub q: f64,
     /// Its limits.
     pub limits: JointLimits,
-}
-
-impl Robot {
-    /// Joints of an encoder vector (radians or metres) that stand beyond their limits.
-    pub fn beyond_limits<'a>(&'a self, q: &'a [f64]) -> impl Iterator<Item = BeyondLimits> + 'a {
-        let joints = self.limits.iter().zip(self.chain.joint_kinds()).zip(q).enumerate();
-        let beyond = joints.filter(|(_, ((limits, _), q))| !limits.contain(**q));
-        beyond.map(|(i, ((&limits, &kind), &q))| BeyondLimits { joint: i + 1, kind, q, limits })
-    }
 }
 
 impl fmt::Display for BeyondLimits {

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod dataset;
+mod hold_out;
 mod limits;
 mod rig;
 mod robot;
@@ -11,7 +12,8 @@ mod stored;
 
 pub use calibration::{Calibration, CalibrationVerdict};
 pub use dataset::{Dataset, MixedSigma, Motion, PoseError, PoseRow, RowWarning};
+pub use hold_out::{Choice, Condition, HeldOut, HoldOutError};
 pub use limits::{BeyondLimits, JointLimits};
 pub use rig::{Bar, End, NamedPoint, PairingId, Rig, RigError};
-pub use robot::{EncoderFacts, Robot, RobotError};
+pub use robot::{EncoderFacts, Robot, RobotError, Standing};
 pub use solids::Solids;

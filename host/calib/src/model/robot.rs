@@ -1,10 +1,12 @@
 //! A robot: a chain, its limits and encoders, and when and from what it was calibrated.
 
+use std::fmt;
+
 use ballbar::{Chain, Coupling, Encoder};
 use thiserror::Error;
 
 use super::calibration::{Calibration, CalibrationVerdict};
-use super::limits::JointLimits;
+use super::limits::{BeyondLimits, JointLimits};
 
 /// A robot as it is believed to be. [`Robot::new`] makes one from numbers.
 #[derive(Clone, Debug)]
@@ -101,14 +103,52 @@ impl Robot {
         self.calibration.as_ref().and_then(|calibration| calibration.verdict)
     }
 
-    /// What this robot's parameters are, in a few words.
-    pub fn standing(&self) -> &'static str {
+    /// What this robot's parameters are.
+    pub fn standing(&self) -> Standing {
         match (&self.calibration, self.verdict()) {
-            (_, Some(CalibrationVerdict::Calibrated)) => "calibrated",
-            (_, Some(CalibrationVerdict::Reserved)) => "calibrated, with reservations",
-            (Some(_), None) => "fitted, but not found to be calibrated",
-            (None, None) => "design, not calibrated",
+            (_, Some(CalibrationVerdict::Calibrated)) => Standing::Calibrated,
+            (_, Some(CalibrationVerdict::Reserved)) => Standing::Reserved,
+            (Some(_), None) => Standing::NotJudged,
+            (None, None) => Standing::Design,
         }
+    }
+
+    /// Joints of an encoder vector (radians or metres) that stand beyond their limits.
+    pub fn beyond_limits<'a>(&'a self, q: &'a [f64]) -> impl Iterator<Item = BeyondLimits> + 'a {
+        let joints = self.limits.iter().zip(self.chain.joint_kinds()).zip(q).enumerate();
+        let beyond = joints.filter(|(_, ((limits, _), q))| !limits.contain(**q));
+        beyond.map(|(i, ((&limits, &kind), &q))| BeyondLimits { joint: i + 1, kind, q, limits })
+    }
+}
+
+/// What a robot's parameters are, by what is kept of the fit behind them: the one rule of who may rely on them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// No fit made them.
+    Design,
+    /// A fit made them, and nothing says that it was good.
+    NotJudged,
+    /// A good fit made them, and something weighs on it.
+    Reserved,
+    /// A good fit made them, and nothing stands against it.
+    Calibrated,
+}
+
+impl Standing {
+    /// Whether the fit was found to be good, with reservations or without.
+    pub fn is_calibrated(self) -> bool {
+        matches!(self, Self::Calibrated | Self::Reserved)
+    }
+}
+
+impl fmt::Display for Standing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Design => "design, not calibrated",
+            Self::NotJudged => "fitted, but not found to be calibrated",
+            Self::Reserved => "calibrated, with reservations",
+            Self::Calibrated => "calibrated",
+        })
     }
 }
 
@@ -126,7 +166,7 @@ mod tests {
         let good = JointLimits { min: -1.0, max: 1.0 };
         let robot = |limits: &[JointLimits]| Robot::new("arm", chain(), limits.to_vec());
         let made = robot(&[good, good]).unwrap();
-        assert_eq!((made.source.as_str(), made.encoders.len(), made.standing()), ("arm", 2, "design, not calibrated"));
+        assert_eq!((made.source.as_str(), made.encoders.len(), made.standing()), ("arm", 2, Standing::Design));
         assert_eq!(robot(&[good]).unwrap_err(), RobotError::LimitCount { found: 1, expected: 2 });
         for (min, max) in [(1.0, -1.0), (1.0, 1.0), (f64::NEG_INFINITY, 1.0), (0.0, f64::INFINITY)] {
             let limits = JointLimits { min, max };

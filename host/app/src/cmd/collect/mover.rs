@@ -6,12 +6,12 @@ use miette::Diagnostic;
 use thiserror::Error;
 
 use crate::cmd::outcome::CommandError;
-use crate::deadline::StopFlag;
+use crate::collect::Mover;
+use crate::remedies::Remedied;
 use crate::robot_link::program::{ControllerSetup, Dialect};
-use crate::robot_link::sim::SimLink;
-use crate::robot_link::urscript::{UrLink, UrPorts};
-use crate::robot_link::val::{VAL_BAUD, ValLink, ValSpeeds};
-use crate::robot_link::{Patience, RobotLink};
+use crate::robot_link::urscript::UrPorts;
+use crate::robot_link::val::VAL_BAUD;
+use crate::robot_link::{ControllerAt, open};
 
 /// Which robot link, and where.
 #[derive(Args)]
@@ -72,16 +72,6 @@ enum DialectArg {
     Fanuc,
 }
 
-/// What moves the robot.
-pub(super) enum Mover {
-    /// A controller on line.
-    Link(Box<dyn RobotLink>),
-    /// Programs that somebody starts.
-    Programs(Dialect),
-    /// Somebody's hand.
-    Hand,
-}
-
 #[derive(Debug, Error, Diagnostic)]
 enum MoverError {
     #[error("--robot-link {link} needs --robot-address")]
@@ -90,30 +80,25 @@ enum MoverError {
     #[error("--robot-link file needs --dialect")]
     #[diagnostic(help("One of val, urscript, krl, rapid, fanuc."))]
     NoDialect,
-    #[error("--robot-link {link}: such a controller has six revolute joints, the robot has {found}")]
-    Joints { link: &'static str, found: String },
 }
 
 impl MoverArgs {
     /// Connects to what moves the robot.
     pub(super) fn open(&self, kinds: &[JointKind]) -> Result<Mover, CommandError> {
-        let link: Box<dyn RobotLink> = match self.robot_link {
+        let controller = match self.robot_link {
             LinkKind::Manual => return Ok(Mover::Hand),
             LinkKind::File => return Ok(Mover::Programs(self.dialect.ok_or(MoverError::NoDialect)?.into())),
-            LinkKind::Sim => Box::new(SimLink::connect(self.sim_address()?, kinds.len())?),
+            LinkKind::Sim => ControllerAt::Sim(self.sim_address()?),
             LinkKind::Val => {
-                six_revolute("val", kinds)?;
-                let port =
-                    self.address("val", "It is the serial port that is connected in the place of the controller's terminal.")?;
-                Box::new(ValLink::open(port, self.robot_baud, ValSpeeds::default(), Patience::default())?)
+                let help = "It is the serial port that is connected in the place of the controller's terminal.";
+                ControllerAt::Val { port: self.address("val", help)?, baud: self.robot_baud }
             }
             LinkKind::Urscript => {
-                six_revolute("urscript", kinds)?;
                 let host = self.address("urscript", "It is the controller's network address.")?;
-                Box::new(UrLink::connect(host, self.robot_ports, Patience::default())?)
+                ControllerAt::UrScript { host, ports: self.robot_ports }
             }
         };
-        Ok(Mover::Link(link))
+        Ok(Mover::Link(open(&controller, kinds).map_err(Remedied)?))
     }
 
     /// What programs have to know of the controller.
@@ -144,32 +129,6 @@ fn parse_ports(text: &str) -> Result<UrPorts, String> {
     match ports.as_deref() {
         Ok(&[script, rtde, dashboard]) => Ok(UrPorts { script, rtde, dashboard }),
         _ => Err("expected three ports, as in 30002,30004,29999".into()),
-    }
-}
-
-fn six_revolute(link: &'static str, kinds: &[JointKind]) -> Result<(), MoverError> {
-    if kinds == [JointKind::Revolute; 6] {
-        return Ok(());
-    }
-    let prismatic = kinds.iter().filter(|kind| **kind == JointKind::Prismatic).count();
-    Err(MoverError::Joints { link, found: format!("{} revolute and {prismatic} prismatic ones", kinds.len() - prismatic) })
-}
-
-impl Mover {
-    /// From here on no controller is waited for any longer once the flag is set.
-    pub(super) fn heed(&mut self, stop: &StopFlag) {
-        if let Self::Link(link) = self {
-            link.heed(stop);
-        }
-    }
-
-    /// For the session.
-    pub(super) fn name(&self) -> String {
-        match self {
-            Self::Link(link) => link.name(),
-            Self::Programs(dialect) => format!("file, {dialect}"),
-            Self::Hand => "manual".into(),
-        }
     }
 }
 

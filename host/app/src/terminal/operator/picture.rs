@@ -10,7 +10,7 @@ use crate::terminal::screen::{Bar, Joint, Picture, Poses};
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// What changes little during a run.
-pub(super) struct Still {
+pub(crate) struct Still {
     /// The command, the port, the board, the robot.
     head: Vec<String>,
     /// Kind and limits of each joint, in the units of the screen.
@@ -36,7 +36,7 @@ const KEYS: &[(&str, &str)] =
     &[("Enter", "done"), ("e", "erase the last pose"), ("s", "skip the next"), ("p", "pause"), ("r", "resume"), ("q", "quit")];
 
 impl Still {
-    pub(super) fn new(head: Vec<String>, robot: &Robot) -> Self {
+    pub(crate) fn new(head: Vec<String>, robot: &Robot) -> Self {
         let limits = |(&kind, limits): (&JointKind, &ballbar_calib::model::JointLimits)| {
             let unit = ScreenUnit::from(kind);
             (kind, [unit.from_si(limits.min), unit.from_si(limits.max)])

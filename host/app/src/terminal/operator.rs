@@ -1,25 +1,28 @@
 //! The operator at a terminal: keys and a steady screen, or lines in and lines out; and the hand of the simulation.
 
+mod picture;
+
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 use ballbar::JointKind;
 
-use super::picture::{Next, Still, picture};
+use super::screen::{Key, Screen};
+use super::{EndRequest, typed_lines};
 use crate::collect::{Event, Operator, Wish};
 use crate::deadline::StopFlag;
 use crate::robot_link::LinkError;
 use crate::robot_link::sim::{SimHand, SimRequest};
 use crate::session::Connection;
-use crate::terminal::screen::{Key, Screen};
-use crate::terminal::{EndRequest, typed_lines};
 use crate::units::{fixed, joints_text, mm_from_m};
+pub(crate) use picture::Still;
+use picture::{Next, picture};
 
 /// What lines do that are typed, for the start of a run.
 const KEYS: &str =
     "Type and press Enter: nothing = done, e = erase last, s = skip, p = pause, r = resume, q = quit (Ctrl-C too).";
 
 /// Who attaches the bar.
-pub(super) enum Hand {
+pub(crate) enum Hand {
     /// The person at the terminal.
     Person,
     /// Nobody has to be asked.
@@ -30,7 +33,7 @@ pub(super) enum Hand {
 
 impl Hand {
     /// From here on nothing is waited for any longer once the flag is set.
-    pub(super) fn heed(&mut self, stop: &StopFlag) {
+    pub(crate) fn heed(&mut self, stop: &StopFlag) {
         if let Self::Sim(hand) = self {
             hand.heed(stop);
         }
@@ -38,7 +41,7 @@ impl Hand {
 }
 
 /// A person at the terminal, or none, with a hand.
-pub(super) struct Terminal {
+pub(crate) struct Terminal {
     hand: Hand,
     still: Still,
     kinds: Vec<JointKind>,
@@ -55,7 +58,7 @@ pub(super) struct Terminal {
 }
 
 impl Terminal {
-    pub(super) fn new(hand: Hand, still: Still, end: EndRequest) -> Self {
+    pub(crate) fn new(hand: Hand, still: Still, end: EndRequest) -> Self {
         let mut screen = Screen::open(&end);
         if matches!(hand, Hand::Person) && !screen.is_steady() {
             screen.note(KEYS);
@@ -66,7 +69,7 @@ impl Terminal {
     }
 
     /// Gives the terminal back.
-    pub(super) fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         self.screen.close();
     }
 
