@@ -5,7 +5,6 @@ mod operator;
 mod picture;
 mod programs;
 mod report;
-mod session_files;
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -19,7 +18,6 @@ use operator::{Hand, Terminal};
 use picture::Still;
 use programs::Programs;
 use report::CollectReport;
-use session_files::SessionFiles;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
@@ -35,7 +33,7 @@ use crate::collect::{
 use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
-use crate::session::{Recorder, Run, SessionLock};
+use crate::session::{Given, Recorder, Run, SessionInputs, SessionLock};
 use crate::terminal::EndRequest;
 use crate::units::m_from_mm;
 
@@ -131,7 +129,7 @@ enum ArgumentError {
 impl CollectArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let options = self.options()?;
-        let files = SessionFiles::open(&self.session, self.plan.as_deref(), self.robot.as_deref(), self.rig.as_deref())?;
+        let files = SessionInputs::open(&self.session, self.given())?;
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
         let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default()).map_err(Remedied)?;
         let plan = CheckedPlan::new(&cell, &files.rows).map_err(ArgumentError::UnsafePlan)?;
@@ -147,7 +145,7 @@ impl CollectArgs {
             check_board(&files.robot, &robot.0, robot.0.is_homed_by(&status))?;
         }
         let lock = SessionLock::acquire(&self.session).map_err(lock_error)?;
-        files.write()?;
+        files.write(&lock)?;
         let guide = match programs {
             None => Guide::Hand,
             Some(programs) => {
@@ -188,6 +186,10 @@ impl CollectArgs {
         closed.map_err(collect_error)?;
         lag.map_err(collect_error)?;
         Ok(if report.is_complete() { Outcome::Good } else { Outcome::Doubtful })
+    }
+
+    fn given(&self) -> Given<'_> {
+        Given { plan: self.plan.as_deref(), robot: self.robot.as_deref(), rig: self.rig.as_deref() }
     }
 
     fn options(&self) -> Result<CollectOptions, CommandError> {

@@ -10,9 +10,11 @@
 
 mod description;
 mod export;
+mod inputs;
 mod lock;
 mod log;
 mod logged_poses;
+mod measured;
 mod own_file;
 mod pose_file;
 mod pose_lines;
@@ -25,9 +27,11 @@ mod summary;
 
 pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
 pub use export::{LogExportError, LogFormat, export_log};
+pub use inputs::{Given, SessionFile, SessionInputError, SessionInputs};
 pub use lock::{Holder, LockError, SessionLock};
 pub use log::{LogError, LogReader, LogWriter, Record};
 pub use logged_poses::{LoggedPose, LoggedPoses};
+pub use measured::{MeasuredError, MeasuredInputs, Named, poses_of};
 pub use own_file::{ForeignChange, ReplaceError};
 pub use pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 pub use pose_lines::Damage;
