@@ -8,6 +8,7 @@
 //! | `session.lock` | held by who writes; says who |
 //! | `plan.csv`, `robot.toml`, `rig.toml` | what a plan was walked with, copied |
 
+mod comparison;
 mod description;
 mod export;
 mod inputs;
@@ -25,6 +26,7 @@ mod segments;
 mod settled_rule;
 mod summary;
 
+pub use comparison::{Comparison, MissingPose, session_of};
 pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
 pub use export::{LogExportError, LogFormat, export_log};
 pub use inputs::{Given, SessionFile, SessionInputError, SessionInputs};
