@@ -21,10 +21,10 @@ use report::CollectReport;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
-use super::outcome::{CommandError, Outcome};
+use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::port::{PortArgs, StillnessArgs};
 use super::report::print;
-use super::stream::{lock_error, record_error, say_recovered};
+use super::stream::say_recovered;
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Nearness, ProgramOptions, TrackOptions, check_board,

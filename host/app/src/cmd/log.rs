@@ -6,9 +6,8 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::inputs::{ForceArgs, OutputArgs};
-use super::outcome::{CommandError, Outcome};
+use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::report::{Report, print, warn};
-use super::stream::{lock_error, record_error};
 use crate::board::StreamLosses;
 use crate::session::{
     Comparison, LOG_NAME, LogExportError, LogFormat, LogReader, LogSummary, MissingPose, SessionLock, export_log, recover,
