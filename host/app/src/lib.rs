@@ -7,6 +7,7 @@
 //! | [`robot_link`] | robot controllers: how a robot is moved, whoever made it |
 //! | [`collect`] | walks a plan: moves the robot, waits, measures, keeps |
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
+//! | [`record`] | watches what a board streams, and keeps it; gets over a lost port |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
 //! | [`export`] | a robot in the formats of others, one file each |
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
@@ -32,6 +33,7 @@ pub mod export;
 pub mod files;
 pub mod paper;
 mod platform;
+pub mod record;
 pub mod remedies;
 pub mod report;
 pub mod robot_link;

@@ -2,7 +2,6 @@
 
 mod mover;
 mod report;
-mod session_files;
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -12,14 +11,13 @@ use clap::Args;
 use miette::Diagnostic;
 use mover::MoverArgs;
 use report::CollectReport;
-use session_files::SessionFiles;
 use thiserror::Error;
 
 use super::inputs::{ListError, OutputArgs};
-use super::outcome::{CommandError, Outcome};
+use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::port::{PortArgs, StillnessArgs};
 use super::report::print;
-use super::stream::{lock_error, record_error, say_recovered};
+use super::stream::say_recovered;
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, Programs, TrackOptions,
@@ -28,7 +26,7 @@ use crate::collect::{
 use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
-use crate::session::{Recorder, Run, SessionLock};
+use crate::session::{Given, Recorder, Run, SessionInputs, SessionLock};
 use crate::terminal::EndRequest;
 use crate::terminal::operator::{Hand, Still, Terminal};
 use crate::units::m_from_mm;
@@ -122,7 +120,7 @@ enum ArgumentError {
 impl CollectArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let options = self.options()?;
-        let files = SessionFiles::open(&self.session, self.plan.as_deref(), self.robot.as_deref(), self.rig.as_deref())?;
+        let files = SessionInputs::open(&self.session, self.given())?;
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
         let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default()).map_err(Remedied)?;
         let plan = CheckedPlan::new(&cell, &files.rows).map_err(ArgumentError::UnsafePlan)?;
@@ -135,7 +133,7 @@ impl CollectArgs {
         let mut link = self.port.connect()?;
         let robot = read_board(&mut link, &files.robot)?;
         let lock = SessionLock::acquire(&self.session).map_err(lock_error)?;
-        files.write()?;
+        files.write(&lock)?;
         let guide = match programs {
             None => Guide::Hand,
             Some(programs) => {
@@ -173,6 +171,10 @@ impl CollectArgs {
         closed.map_err(collect_error)?;
         lag.map_err(collect_error)?;
         Ok(if report.is_complete() { Outcome::Good } else { Outcome::Doubtful })
+    }
+
+    fn given(&self) -> Given<'_> {
+        Given { plan: self.plan.as_deref(), robot: self.robot.as_deref(), rig: self.rig.as_deref() }
     }
 
     fn options(&self) -> Result<CollectOptions, CommandError> {

@@ -1,8 +1,8 @@
 //! Arguments that several commands share, and reading what they name.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use ballbar_calib::model::{Dataset, HeldOut, PairingId, Rig, Robot, RowWarning};
+use ballbar_calib::model::{Dataset, HeldOut, PairingId, Rig, Robot};
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
@@ -10,8 +10,8 @@ use thiserror::Error;
 use super::hold_out::HoldOut;
 use super::outcome::CommandError;
 use super::report::warn;
-use crate::files::{Source, open_rig, parse_robot, read_poses, robot_source};
-use crate::session::{POSES_NAME, RIG_NAME, ROBOT_NAME};
+use crate::files::Source;
+use crate::session::{MeasuredInputs, Named};
 
 /// `--json`.
 #[derive(Args)]
@@ -72,13 +72,9 @@ impl Measured {
 impl MeasuredArgs {
     /// Reads the files and says on stderr what may be wrong with them.
     pub(super) fn read(&self) -> Result<Measured, CommandError> {
-        let robot_source = robot_source(&self.of_session(self.robot.as_ref(), "--robot", ROBOT_NAME)?)?;
-        let robot = parse_robot(&robot_source)?;
-        let rig_name = self.of_session(self.rig.as_ref(), "--rig", RIG_NAME)?;
-        let rig = open_rig(&rig_name)?;
-        let files: Vec<PathBuf> = self.poses.iter().map(|path| poses_of(path)).collect::<Result<_, _>>()?;
-        let dataset = read_poses(files.iter().map(PathBuf::as_path), &robot, &rig)?;
-        let warnings = summarise(&dataset, &dataset.warnings(&robot, &rig));
+        let named = Named { robot: self.robot.as_deref(), rig: self.rig.as_deref(), poses: &self.poses };
+        let MeasuredInputs { robot, robot_source, rig, rig_name, dataset } = named.read()?;
+        let warnings = dataset.warning_sentences(&robot, &rig);
         for warning in &warnings {
             warn(warning);
         }
@@ -91,22 +87,6 @@ impl MeasuredArgs {
         };
         Ok(Measured { robot, robot_source, rig, rig_name, dataset, held_out, warnings })
     }
-
-    /// What was given, or else the file of that name in the sessions; they have to agree.
-    fn of_session(&self, given: Option<&String>, flag: &'static str, name: &'static str) -> Result<String, CommandError> {
-        if let Some(given) = given {
-            return Ok(given.clone());
-        }
-        let files: Vec<PathBuf> = self.poses.iter().map(|path| path.join(name)).filter(|file| file.is_file()).collect();
-        let texts: Vec<Source> = files.iter().map(|file| Source::read_toml(file)).collect::<Result<_, _>>()?;
-        match files.split_first() {
-            None => Err(ListError::Missing { flag, name }.into()),
-            Some(_) if texts.windows(2).any(|pair| pair[0].text() != pair[1].text()) => {
-                Err(ListError::SessionsDiffer { flag, name }.into())
-            }
-            Some((first, _)) => Ok(first.display().to_string()),
-        }
-    }
 }
 
 /// Whether `--max-rms-mm` can be a limit.
@@ -115,34 +95,6 @@ pub(super) fn check_max_rms_mm(limit: Option<f64>) -> Result<(), ListError> {
         Some(limit) => Err(ListError::Number { flag: "--max-rms-mm", found: limit.to_string(), expected: "a number above zero" }),
         None => Ok(()),
     }
-}
-
-/// The file itself, or a session's.
-pub(super) fn poses_of(path: &Path) -> Result<PathBuf, ListError> {
-    if !path.is_dir() {
-        return Ok(path.to_owned());
-    }
-    let poses = path.join(POSES_NAME);
-    if poses.is_file() { Ok(poses) } else { Err(ListError::NoPosesYet(path.to_owned())) }
-}
-
-/// One sentence for each kind of warning, with the first rows that it concerns.
-fn summarise(dataset: &Dataset, warnings: &[(usize, RowWarning)]) -> Vec<String> {
-    const SHOWN: usize = 5;
-    let mut kinds: Vec<(String, Vec<usize>)> = Vec::new();
-    for (row, warning) in warnings {
-        let text = warning.to_string();
-        match kinds.iter_mut().find(|(kind, _)| *kind == text) {
-            Some((_, rows)) => rows.push(*row),
-            None => kinds.push((text, vec![*row])),
-        }
-    }
-    let sentence = |(text, rows): &(String, Vec<usize>)| {
-        let places: Vec<String> = rows.iter().take(SHOWN).map(|&row| dataset.place(row)).collect();
-        let more = if rows.len() > SHOWN { format!(" and {} more", rows.len() - SHOWN) } else { String::new() };
-        format!("poses that {text}: {} of {}, at {}{more}", rows.len(), dataset.rows.len(), places.join(", "))
-    };
-    kinds.iter().map(sentence).collect()
 }
 
 /// Why a list on the command line cannot be used.
@@ -159,28 +111,6 @@ pub(super) enum ListError {
     #[error("no pose has one of the pairings {0}")]
     #[diagnostic(help("The poses have {1}."))]
     NoPoseLeft(String, String),
-    /// Neither given nor in a session.
-    #[error("{flag} is missing, and no session among the poses holds a {name}")]
-    #[diagnostic(help("Give it: {flag} FILE. Sessions that `host-cal collect` recorded hold theirs."))]
-    Missing {
-        /// The flag.
-        flag: &'static str,
-        /// The session's file.
-        name: &'static str,
-    },
-    /// Sessions of different robots or rigs.
-    #[error("the sessions hold different files {name}")]
-    #[diagnostic(help("Say which one to use: {flag} FILE"))]
-    SessionsDiffer {
-        /// The flag.
-        flag: &'static str,
-        /// The session's file.
-        name: &'static str,
-    },
-    /// A directory without poses.
-    #[error("{}: holds no poses.csv", .0.display())]
-    #[diagnostic(help("Give a file of poses, or a session into which poses were recorded."))]
-    NoPosesYet(PathBuf),
     /// No bar length to simulate.
     #[error("the rig names no bar length")]
     #[diagnostic(help("Give one, in millimetres: --bar 460"))]

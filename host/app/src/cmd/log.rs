@@ -1,23 +1,20 @@
 //! `host-cal log`: check, recover and export what the log of a session holds.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::inputs::{ForceArgs, OutputArgs};
-use super::outcome::{CommandError, Outcome};
+use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::report::{Report, print, warn};
-use super::stream::{lock_error, record_error};
 use crate::board::StreamLosses;
 use crate::session::{
-    DESCRIPTION_NAME, LOG_NAME, LogExportError, LogFormat, LogReader, LogSummary, LoggedPose, LoggedPoses, SessionLock,
-    export_log, missing_poses, recover,
+    Comparison, LOG_NAME, LogExportError, LogFormat, LogReader, LogSummary, MissingPose, SessionLock, export_log, recover,
+    session_of,
 };
 use crate::terminal::{EndRequest, INTERRUPTED};
 use crate::text::{one_line, shown_path};
-use crate::units::{mm_from_m, tidy};
 
 /// Check, recover or export the log of a session (stream.bbl)
 #[derive(Args)]
@@ -90,27 +87,6 @@ struct CheckReport {
     comparison: Option<Comparison>,
 }
 
-/// The poses of a log beside those of poses.csv.
-#[derive(Serialize)]
-struct Comparison {
-    session: String,
-    /// Measured, those erased again not counted.
-    poses_measured: usize,
-    poses_erased: usize,
-    /// Not in poses.csv.
-    poses_missing: Vec<MissingPose>,
-}
-
-#[derive(Serialize)]
-struct MissingPose {
-    t_s: f64,
-    chuck: String,
-    sphere: String,
-    bar_mm: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    plan_row: Option<usize>,
-}
-
 #[derive(Serialize)]
 struct RecoverReport {
     session: String,
@@ -149,53 +125,14 @@ fn check(log: &Path, json: bool) -> Result<Outcome, CommandError> {
     let report = CheckReport { log: reader.path().display().to_string(), summary, comparison };
     print(&report, json)?;
     if let Some(error) = unreadable {
-        return Err(error);
+        return Err(record_error(error.into()));
     }
     Ok(if report.is_whole() { Outcome::Good } else { Outcome::Doubtful })
 }
 
-/// The session that a log is the log of.
-fn session_of(log: &Path) -> Option<PathBuf> {
-    let session = log.parent()?;
-    let is_session = log.file_name().is_some_and(|name| name == LOG_NAME) && session.join(DESCRIPTION_NAME).is_file();
-    is_session.then(|| session.to_owned())
-}
-
-impl Comparison {
-    fn new(session: &Path, logged: &LoggedPoses) -> Result<Self, CommandError> {
-        let mut missing = missing_poses(session, logged).map_err(|error| record_error(error.into()))?;
-        if !missing.is_empty() {
-            // In a session that is being recorded the latest pose may have been on its way.
-            std::thread::sleep(ON_ITS_WAY);
-            missing = missing_poses(session, logged).map_err(|error| record_error(error.into()))?;
-        }
-        Ok(Self {
-            session: session.display().to_string(),
-            poses_measured: logged.count(),
-            poses_erased: logged.erased(),
-            poses_missing: missing.into_iter().map(Into::into).collect(),
-        })
-    }
-}
-
-/// From a pose's way into the log to its way into poses.csv, at most, on a slow disk.
-const ON_ITS_WAY: Duration = Duration::from_millis(300);
-
-impl From<LoggedPose> for MissingPose {
-    fn from(LoggedPose { connection, pose, .. }: LoggedPose) -> Self {
-        Self {
-            t_s: pose.t_s,
-            chuck: connection.chuck.clone(),
-            sphere: connection.sphere.clone(),
-            bar_mm: tidy(mm_from_m(connection.bar_m)),
-            plan_row: pose.plan_row,
-        }
-    }
-}
-
 impl CheckReport {
     fn is_whole(&self) -> bool {
-        self.summary.is_whole() && self.comparison.as_ref().is_none_or(|poses| poses.poses_missing.is_empty())
+        self.summary.is_whole() && self.comparison.as_ref().is_none_or(Comparison::is_whole)
     }
 }
 
@@ -261,27 +198,24 @@ impl Report for CheckReport {
         if !self.summary.is_whole() {
             text += &(missing(&self.summary) + "\n");
         }
-        text + &self.comparison.as_ref().map_or_else(String::new, Comparison::missing)
+        text + &self.comparison.as_ref().map_or_else(String::new, missing_in_poses)
     }
 }
 
-impl Comparison {
-    /// What poses.csv lacks, in words.
-    fn missing(&self) -> String {
-        const SHOWN: usize = 10;
-        let Self { session, poses_missing, .. } = self;
-        if poses_missing.is_empty() {
-            return String::new();
-        }
-        let mut text = format!("MISSING in poses.csv: {} poses\n", poses_missing.len());
-        for MissingPose { t_s, chuck, sphere, bar_mm, .. } in poses_missing.iter().take(SHOWN) {
-            text += &format!("  {t_s:.6} s, {chuck}:{sphere}, {bar_mm} mm\n");
-        }
-        text += if poses_missing.len() > SHOWN { "  …\n" } else { "" };
-        text + &format!("Write them: host-cal log recover {session}\n")
+/// What poses.csv lacks, in words.
+fn missing_in_poses(comparison: &Comparison) -> String {
+    const SHOWN: usize = 10;
+    let Comparison { session, poses_missing, .. } = comparison;
+    if poses_missing.is_empty() {
+        return String::new();
     }
+    let mut text = format!("MISSING in poses.csv: {} poses\n", poses_missing.len());
+    for MissingPose { t_s, chuck, sphere, bar_mm, .. } in poses_missing.iter().take(SHOWN) {
+        text += &format!("  {t_s:.6} s, {chuck}:{sphere}, {bar_mm} mm\n");
+    }
+    text += if poses_missing.len() > SHOWN { "  …\n" } else { "" };
+    text + &format!("Write them: host-cal log recover {session}\n")
 }
-
 impl Report for RecoverReport {
     fn text(&self) -> String {
         let Self { session, poses_recovered } = self;

@@ -32,6 +32,7 @@ mod pose;
 mod rank;
 mod report;
 mod report_page;
+mod session_words;
 mod simulate;
 mod status;
 mod stream;

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use miette::{Diagnostic, Report};
 
 use crate::files::WriteError;
+use crate::session::{LockError, RecordError};
 
 /// How a command that ran to its end ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,5 +50,18 @@ impl CommandError {
 impl<E: Diagnostic + Send + Sync + 'static> From<E> for CommandError {
     fn from(error: E) -> Self {
         Self { report: Report::new(error), exit_code: 2 }
+    }
+}
+
+/// What is there and cannot be read is bad input; what cannot be written is not.
+pub(super) fn record_error(error: RecordError) -> CommandError {
+    if error.is_of_input() { error.into() } else { CommandError::output(error) }
+}
+
+/// Another writer is no failure to write.
+pub(super) fn lock_error(error: LockError) -> CommandError {
+    match error {
+        LockError::InUse { .. } => error.into(),
+        error => CommandError::output(error),
     }
 }

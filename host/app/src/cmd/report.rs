@@ -55,11 +55,6 @@ pub(super) fn write_files(files: &[NamedFile], force: bool) -> Result<(), Comman
     })
 }
 
-/// Writes a file of the session that is being recorded.
-pub(super) fn write_session_file(path: &Path, contents: &str) -> Result<(), CommandError> {
-    write_atomically(path, contents).map_err(CommandError::output)
-}
-
 /// Writes a robot's file with what is worth keeping of a fit, as [`files::write_calibrated`]; whether there was anything.
 pub(super) fn write_calibrated(
     path: &Path,

@@ -11,12 +11,13 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::hold::parse_hold;
-use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm, poses_of};
+use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_files};
 use crate::files::{FileKind, Output, read_poses};
 use crate::remedies::Remedied;
 use crate::report::{Facts, Figure, Inputs, figures, html, parameters_table};
+use crate::session::poses_of;
 use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
 

@@ -1,33 +1,29 @@
 //! `host-cal stream`: watch a board, and record what it sends.
 
-mod account;
-mod live;
 mod picture;
 mod watch;
+mod words;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-use account::Account;
-use ballbar::wire::{Command, FrameCounts, StreamSelection};
+use ballbar::wire::{FrameCounts, StreamSelection};
 use ballbar_calib::model::{Rig, Robot};
 use clap::Args;
-use live::{Latest, Model};
 use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 use watch::Watch;
 
 use super::inputs::{OutputArgs, parse_pairings};
-use super::outcome::{CommandError, Outcome};
+use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::port::{PortArgs, StillnessArgs};
 use super::report::{Report, print, warn};
 use crate::board::{BoardLink, RobotOnBoard, StreamLosses, check_kinds};
 use crate::files::{open_rig, open_robot};
+use crate::record::{Account, ExpectedLength, Latest, Watched};
 use crate::remedies::Remedied;
-use crate::session::{
-    Connection, DescriptionError, LockError, LogError, PoseFileError, ROBOT_NAME, RecordError, Recorder, Run, SessionLock,
-};
+use crate::session::{Connection, ROBOT_NAME, Recorder, Run, SessionLock};
 use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
 
@@ -153,9 +149,10 @@ impl StreamArgs {
             check_kinds(limits, robot.kinds()).map_err(Remedied)?;
         }
         let recorder = self.recorder(&link, robot.as_ref(), connection.clone())?;
-        let model = self.model(robot.as_ref().map(|(robot, _)| robot))?;
         let robot = robot.map(|(robot, _)| robot);
-        let account = Account::new(robot, limits, model, recorder, connection, self.stillness.criteria());
+        let expected = self.expected_length(robot.as_ref())?;
+        let criteria = self.stillness.criteria();
+        let account = Account::new(Watched { robot, limits, expected, recorder, connection, criteria });
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
         let (report, closed) = watch.finish();
@@ -180,13 +177,6 @@ impl StreamArgs {
         }
         let kept = self.session.as_ref().map(|session| session.join(ROBOT_NAME)).filter(|path| path.is_file());
         Ok(kept.map(|path| open_robot(&path.to_string_lossy())).transpose()?)
-    }
-
-    /// Tells the board what to do; again after it was away.
-    fn start(&self, link: &mut BoardLink) -> Result<(), crate::board::BoardError> {
-        link.act(Command::SetRate { rate_hz: self.rate })?;
-        link.act(Command::SetStillness(self.stillness.criteria()))?;
-        link.start_stream(self.selection())
     }
 
     fn connection(&self) -> Result<Option<Connection>, CommandError> {
@@ -218,11 +208,11 @@ impl StreamArgs {
     }
 
     /// What computes lengths, when it is known what the bar joins and where.
-    fn model(&self, robot: Option<&RobotOnBoard>) -> Result<Option<Model>, CommandError> {
+    fn expected_length(&self, robot: Option<&RobotOnBoard>) -> Result<Option<ExpectedLength>, CommandError> {
         let (Some(rig), Some(pairing), Some(robot)) = (&self.rig, &self.pairing, robot) else { return Ok(None) };
         let rig = open_rig(rig)?;
         let pairing = parse_pairings(pairing, &rig)?.first().map(|&id| rig.pairing(id));
-        Ok(pairing.and_then(|pairing| Model::new(robot, pairing)))
+        Ok(pairing.and_then(|pairing| ExpectedLength::new(robot, pairing)))
     }
 
     fn recorder(
@@ -254,27 +244,6 @@ impl StreamArgs {
             warn("without --pairing and --bar the settled poses go to the log and not to poses.csv");
         }
         Ok(Some(recorder))
-    }
-}
-
-/// What is there and cannot be read is bad input; what cannot be written is not.
-pub(super) fn record_error(error: RecordError) -> CommandError {
-    match error {
-        RecordError::Log(LogError::NotALog { .. } | LogError::OtherVersion { .. })
-        | RecordError::Description(DescriptionError::Unreadable { .. })
-        | RecordError::Poses(
-            PoseFileError::OtherColumns { .. } | PoseFileError::Unreadable { .. } | PoseFileError::Damaged { .. },
-        )
-        | RecordError::LongNames { .. } => error.into(),
-        error => CommandError::output(error),
-    }
-}
-
-/// Another writer is no failure to write.
-pub(super) fn lock_error(error: LockError) -> CommandError {
-    match error {
-        LockError::InUse { .. } => error.into(),
-        error => CommandError::output(error),
     }
 }
 

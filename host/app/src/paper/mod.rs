@@ -1,10 +1,12 @@
 //! The paper's experiment: A. Goswami, A. Quaid and M. Peshkin, "Identifying Robot Parameters Using Partial Pose Information",
 //! IEEE Control Systems 13(5), 1993, simulated from its Table II and set beside its own numbers.
 
+mod beside;
 mod experiment;
 mod pairings;
 mod stewart;
 
+pub use beside::{BesideThePaper, ClassLine, LongitudeLine, Number, RecoveredLine};
 pub use experiment::{Experiment, ExperimentError, Longitude, Recovered, run};
 pub use pairings::{PairingRanks, RankClass};
 pub use stewart::{StewartPlatform, amplification};

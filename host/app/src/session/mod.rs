@@ -8,11 +8,14 @@
 //! | `session.lock` | held by who writes; says who |
 //! | `plan.csv`, `robot.toml`, `rig.toml` | what a plan was walked with, copied |
 
+mod comparison;
 mod description;
 mod export;
+mod inputs;
 mod lock;
 mod log;
 mod logged_poses;
+mod measured;
 mod own_file;
 mod pose_file;
 mod pose_lines;
@@ -23,11 +26,14 @@ mod segments;
 mod settled_rule;
 mod summary;
 
+pub use comparison::{Comparison, MissingPose, session_of};
 pub use description::{BoardDescription, Description, DescriptionError, RobotDescription, Run};
 pub use export::{LogExportError, LogFormat, export_log};
+pub use inputs::{Given, SessionFile, SessionInputError, SessionInputs};
 pub use lock::{Holder, LockError, SessionLock};
 pub use log::{LogError, LogReader, LogWriter, Record};
 pub use logged_poses::{LoggedPose, LoggedPoses};
+pub use measured::{MeasuredError, MeasuredInputs, Named, poses_of};
 pub use own_file::{ForeignChange, ReplaceError};
 pub use pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 pub use pose_lines::Damage;

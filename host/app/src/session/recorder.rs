@@ -45,6 +45,21 @@ pub enum RecordError {
     },
 }
 
+impl RecordError {
+    /// Whether it is what is there that cannot be used, and not what was to be written that could not be.
+    pub fn is_of_input(&self) -> bool {
+        matches!(
+            self,
+            Self::Log(LogError::NotALog { .. } | LogError::OtherVersion { .. })
+                | Self::Description(DescriptionError::Unreadable { .. })
+                | Self::Poses(
+                    PoseFileError::OtherColumns { .. } | PoseFileError::Unreadable { .. } | PoseFileError::Damaged { .. },
+                )
+                | Self::LongNames { .. }
+        )
+    }
+}
+
 /// Which ends the bar joined, and how long it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Connection {

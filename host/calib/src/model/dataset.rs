@@ -272,6 +272,24 @@ impl Dataset {
         }
         warnings
     }
+
+    /// One sentence for each kind of [`Dataset::warnings`], with the first places that it concerns.
+    pub fn warning_sentences(&self, robot: &Robot, rig: &Rig) -> Vec<String> {
+        const SHOWN: usize = 5;
+        let mut kinds: Vec<(RowWarning, Vec<usize>)> = Vec::new();
+        for (row, warning) in self.warnings(robot, rig) {
+            match kinds.iter_mut().find(|(kind, _)| *kind == warning) {
+                Some((_, rows)) => rows.push(row),
+                None => kinds.push((warning, vec![row])),
+            }
+        }
+        let sentence = |(kind, rows): &(RowWarning, Vec<usize>)| {
+            let places: Vec<String> = rows.iter().take(SHOWN).map(|&row| self.place(row)).collect();
+            let more = if rows.len() > SHOWN { format!(" and {} more", rows.len() - SHOWN) } else { String::new() };
+            format!("poses that {kind}: {} of {}, at {}{more}", rows.len(), self.rows.len(), places.join(", "))
+        };
+        kinds.iter().map(sentence).collect()
+    }
 }
 
 #[cfg(test)]

@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::session_files::SessionFiles;
 use crate::board::StreamLosses;
 use crate::cmd::report::Report;
 use crate::collect::{CollectError, Ended, Lag, Ledger, RowState, Summary};
+use crate::session::SessionInputs;
 use crate::text::one_line;
 use crate::units::mm_from_m;
 
@@ -58,7 +58,7 @@ struct RepeatLine {
 impl CollectReport {
     pub(super) fn new(
         session: &Path,
-        files: &SessionFiles,
+        files: &SessionInputs,
         ledger: &Ledger<'_>,
         summary: &Summary,
         ended: &Result<Ended, CollectError>,

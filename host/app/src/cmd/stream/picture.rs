@@ -1,22 +1,20 @@
 //! What the steady screen of `stream` shows.
 
-use std::time::Duration;
-
 use ballbar::Stillness;
 
 use super::StreamArgs;
-use super::account::Account;
-use super::live::Latest;
-use crate::board::{BoardLink, RobotOnBoard};
+use crate::board::RobotOnBoard;
+use crate::record::{Account, Latest, Recording};
 use crate::terminal::screen::{Bar, Joint, Picture, Poses};
 use crate::units::mm_from_m;
 
-/// The picture of a moment; without a link, of a board that is away.
-pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Account, elapsed: Duration) -> Picture {
-    let (away, robot) = (Latest::default(), account.robot.as_ref());
-    let latest = if link.is_some() { &account.latest } else { &away };
+/// The picture of a moment.
+pub(super) fn picture(args: &StreamArgs, recording: &Recording) -> Picture {
+    let (account, board, elapsed) = (recording.account(), recording.board(), recording.elapsed());
+    let (away, robot) = (Latest::default(), account.robot());
+    let latest = if board.is_some() { account.latest() } else { &away };
     let mut head = vec!["stream".to_owned(), args.port.port.clone()];
-    head.extend(link.map(|link| format!("{} {}", link.hello().board, link.hello().firmware)));
+    head.extend(board.map(|board| format!("{} {}", board.board, board.firmware)));
     head.extend(robot.map(|robot| robot.set().name.as_str().to_owned()));
     let joints = match (&latest.q, robot) {
         (Some(q), Some(robot)) => robot.kinds().iter().zip(q).map(|(&kind, &q)| Joint::new(kind, q)).collect(),
@@ -31,7 +29,7 @@ pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Acc
         elapsed,
         joints,
         bar: Bar {
-            name: account.connection.as_ref().map(ToString::to_string),
+            name: account.connection().map(ToString::to_string),
             length_mm: latest.length_mm,
             displacement_mm: latest.displacement_mm,
             travel_mm,
@@ -39,13 +37,13 @@ pub(super) fn picture(args: &StreamArgs, link: Option<&BoardLink>, account: &Acc
         },
         tool_mm: latest.position_mm,
         rate_hz: account.rate_hz(),
-        lost: account.lost(),
+        lost: account.losses().lost(),
         stillness: latest.stillness,
-        is_homed: account.is_homed.filter(|_| link.is_some()),
-        residual_mm: account.residual_mm().filter(|_| link.is_some()),
-        poses: Poses { done: account.settled, of: args.poses, left: args.time.map(|time| time.saturating_sub(elapsed)) },
-        next: next(args, link.is_some(), account, robot),
-        is_waiting: link.is_none(),
+        is_homed: account.is_homed().filter(|_| board.is_some()),
+        residual_mm: account.residual_mm().filter(|_| board.is_some()),
+        poses: Poses { done: account.counts().settled, of: args.poses, left: args.time.map(|time| time.saturating_sub(elapsed)) },
+        next: next(args, board.is_some(), account, robot),
+        is_waiting: board.is_none(),
         keys: &[("q", "end")],
     }
 }
@@ -58,19 +56,19 @@ fn next(args: &StreamArgs, is_there: bool, account: &Account, robot: Option<&Rob
     if robot.is_none() {
         return format!("the board knows no robot: end, and host-cal apply {port} --robot robot.toml --uncalibrated");
     }
-    if account.is_homed == Some(false) {
+    if account.is_homed() == Some(false) {
         return format!("bring the arm to a known pose, end, and host-cal home {port} --q …");
     }
     if !args.selection().settled {
         return "watch".into();
     }
-    if account.latest.counts.is_empty() {
+    if account.latest().counts.is_empty() {
         return "the board is asked".into();
     }
-    if account.latest.displacement_mm.is_none() {
+    if account.latest().displacement_mm.is_none() {
         return "attach the bar, or move the arm until the bar is within its travel".into();
     }
-    match account.latest.stillness {
+    match account.latest().stillness {
         Some(Stillness::Settled) => "the arm stands still: move it to the next pose".into(),
         Some(Stillness::Settling) => "hold still".into(),
         _ => "move the arm to a pose, and let it stand still".into(),
