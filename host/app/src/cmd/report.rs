@@ -8,7 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::outcome::CommandError;
-use crate::files::{self, CalibratedError, FilesError, NamedFile, Output, Source, write_atomically};
+use crate::files::{self, CalibratedError, FilesError, NamedFile, Output, Source};
 use crate::terminal::out;
 pub(super) use crate::terminal::out::warn;
 use crate::text::visible_json;
