@@ -283,18 +283,8 @@ fn why_unfit(robot: &Robot, rig: &Rig, plan: &Plan) -> Vec<String> {
     const MORE: &str = "ask for more poses with --per-pair, --bar or --pairings";
     let Some(unfit) = plan.unfit else { return Vec::new() };
     let mut why = vec![match unfit {
-        Unfit::FewPoses { poses, parameters } => format!(
-            "{poses} poses for {parameters} parameters: a fit would take noise for parameters, expected three times as many poses; {MORE}"
-        ),
-        Unfit::Rank { rank, parameters } => {
-            format!("these poses identify {rank} of {parameters} parameters: a fit would leave the others at their design values")
-        }
-        Unfit::Noise { amplification, tool_m, design_m } => format!(
-            "noise of the lengths reaches the tool {amplification:.0} times as large, {:.1} mm by usual noise; that is more than a design \
-             is plausibly off, {:.1} mm, and a fit would do harm; {MORE}",
-            mm_from_m(tool_m),
-            mm_from_m(design_m)
-        ),
+        Unfit::FewPoses { .. } | Unfit::Noise { .. } => format!("{unfit}; {MORE}"),
+        Unfit::Rank { .. } => unfit.to_string(),
     }];
     if !matches!(unfit, Unfit::Noise { .. }) {
         why.extend(remarks(&robot.chain, &plan.as_dataset(rig), rig, &robot.limits));
