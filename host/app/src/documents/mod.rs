@@ -2,6 +2,10 @@
 
 mod fit;
 mod lines;
+mod margins;
+mod plan;
 
 pub use fit::{FitDocument, Fitted, FoldsLine, OutlierLine, PairingChange, ParameterLine};
 pub use lines::{HeldOutRows, NotIdentified, PairingLine, ResidualLine, largest};
+pub use margins::{CheckDocument, Least, MarginLine};
+pub use plan::{ComparisonLine, PlanDocument, QualityLine, Reason, RowLine, RowMarginLine, ShellLine};
