@@ -12,6 +12,7 @@
 //! | [`export`] | a robot in the formats of others, one file each |
 //! | [`virtual_board`] | the firmware with a simulated robot and bar, behind a port |
 //! | [`paper`] | the paper's experiment, and its numbers |
+//! | [`documents`] | what commands print as JSON, as types |
 //! | [`report`] | a calibration as a page for people: facts, figures, HTML |
 //! | [`remedies`] | what to do about the errors of the calibration library and of the procedures |
 //! | [`shell`] | manual pages, and what completes arguments |
@@ -29,6 +30,7 @@ pub mod board;
 pub mod cmd;
 pub mod collect;
 pub mod deadline;
+pub mod documents;
 pub mod export;
 pub mod files;
 pub mod paper;

@@ -3,11 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use ballbar::Chain;
-use ballbar_calib::identify::{ResidualSummary, residuals};
-use ballbar_calib::model::{self, Choice, Condition, Dataset, HeldOut, Rig, Robot};
+use ballbar_calib::model::{self, Choice, Condition, Dataset, HeldOut, Rig};
 use miette::Diagnostic;
-use serde::Serialize;
 use thiserror::Error;
 
 use super::inputs::parse_pairings;
@@ -105,37 +102,4 @@ fn in_words(choice: &Choice, rig: &Rig) -> String {
         .map(|(before, words, after)| format!("{before}{words}{after}"))
         .collect::<Vec<_>>()
         .join("; ")
-}
-
-/// How well held-out poses are predicted, by the design and by the fit.
-#[derive(Serialize)]
-pub(super) struct HeldOutRows {
-    rule: String,
-    poses: usize,
-    rms_initial_mm: f64,
-    pub(super) rms_mm: f64,
-    max_abs_mm: f64,
-    mean_mm: f64,
-}
-
-impl HeldOutRows {
-    pub(super) fn new(rule: &HoldOut, rows: &Dataset, design: &Robot, fitted: &Chain<f64>) -> Self {
-        let summary = |chain| ResidualSummary::new(&residuals(chain, rows));
-        let (initial, after) = (summary(&design.chain), summary(fitted));
-        Self {
-            rule: rule.to_string(),
-            poses: after.count,
-            rms_initial_mm: mm_from_m(initial.rms_m),
-            rms_mm: mm_from_m(after.rms_m),
-            max_abs_mm: mm_from_m(after.max_abs_m),
-            mean_mm: mm_from_m(after.mean_m),
-        }
-    }
-
-    pub(super) fn text(&self) -> String {
-        format!(
-            "held out ({}), {} poses: RMS {:.4} mm before, {:.4} mm after, mean {:.4} mm, largest {:.4} mm\n",
-            self.rule, self.poses, self.rms_initial_mm, self.rms_mm, self.mean_mm, self.max_abs_mm
-        )
-    }
 }

@@ -17,7 +17,6 @@ mod hold_out;
 mod home;
 mod import;
 mod inputs;
-mod lines;
 mod log;
 mod lvdt;
 mod manual;

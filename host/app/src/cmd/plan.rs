@@ -10,9 +10,9 @@ use indicatif::ProgressBar;
 
 use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
 use super::outcome::{CommandError, Outcome};
-use super::plan_margins::{CheckReport, Least};
-use super::plan_report::PlanReport;
+use super::plan_report::warnings;
 use super::report::{print, warn, write_file};
+use crate::documents::{CheckDocument, Least, PlanDocument};
 use crate::files::{FileKind, Output, Source, open_rig, open_robot, read_plan, write_plan};
 use crate::remedies::Remedied;
 use crate::terminal::progress;
@@ -143,7 +143,8 @@ impl PlanArgs {
         if let Some(path) = &self.out {
             write_file(self.output_to(path), &write_plan(robot, rig, &plan.rows))?;
         }
-        let report = PlanReport::new(robot, rig, &options, &plan, &found, planning_s, self.out.as_deref());
+        let mut report = PlanDocument::new(robot, rig, &options, &plan, &found, planning_s, self.out.as_deref());
+        report.warnings = warnings(robot, rig, &plan, &report);
         for warning in &report.warnings {
             warn(warning);
         }
@@ -166,7 +167,7 @@ impl PlanArgs {
     ) -> Result<Outcome, CommandError> {
         let rows = read_plan(source, robot, rig)?;
         let found = self.checked(robot, rig, travel_m, margins, pace, &rows)?;
-        let report = CheckReport::new(source.name(), robot, &rows, Least::new(robot, &found), &margins);
+        let report = CheckDocument::new(source.name(), robot, &rows, Least::new(robot, &found), &margins);
         print(&report, self.output.json)?;
         Ok(if report.is_kept { Outcome::Good } else { Outcome::Doubtful })
     }

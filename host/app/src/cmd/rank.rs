@@ -5,9 +5,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs, parse_pairings};
-use super::lines::NotIdentified;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
+use crate::documents::NotIdentified;
 use crate::terminal::table::Columns;
 use crate::units::mm_from_m;
 

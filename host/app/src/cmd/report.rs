@@ -8,9 +8,11 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::outcome::CommandError;
+use crate::documents::ResidualLine;
 use crate::files::{self, CalibratedError, FilesError, NamedFile, Output, Source};
 use crate::terminal::out;
 pub(super) use crate::terminal::out::warn;
+use crate::terminal::table::{Columns, fixed};
 use crate::text::visible_json;
 
 /// A result that can be shown as text and as JSON.
@@ -67,4 +69,13 @@ pub(super) fn write_calibrated(
         CalibratedError::Edit { .. } => CommandError::output(error),
         CalibratedError::Write(error) => CommandError::not_written(error),
     })
+}
+
+/// A table of the largest residuals.
+pub(super) fn largest_text(lines: &[ResidualLine]) -> String {
+    let mut table = Columns::new(&["row", "<at", "<pairing", "residual mm"]);
+    for line in lines {
+        table.row([line.row.to_string(), line.place.clone(), line.pairing.clone(), fixed(line.residual_mm, 4)]);
+    }
+    table.text()
 }

@@ -6,9 +6,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
-use super::lines::{PairingLine, ResidualLine, largest, largest_text};
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, print};
+use super::report::{Report, largest_text, print};
+use crate::documents::{PairingLine, ResidualLine, largest};
 use crate::terminal::table::{Columns, fixed};
 use crate::units::mm_from_m;
 

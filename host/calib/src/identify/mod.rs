@@ -11,6 +11,7 @@
 
 mod advice;
 mod fit;
+mod fit_remarks;
 mod hold;
 mod identifiability;
 mod lm;
@@ -27,6 +28,7 @@ mod uncertainty;
 
 pub use advice::{bound_by_ends, bound_by_pairings, remarks};
 pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, fit};
+pub use fit_remarks::FitRemark;
 pub use hold::{Held, Hold, HoldRule};
 pub use identifiability::{Finding, Identifiability, plausible_error};
 pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};

@@ -1,5 +1,7 @@
 //! How well a set of poses will tell the parameters, before any is measured.
 
+use std::fmt;
+
 use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement, Parameter, Vector3};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -10,6 +12,7 @@ use super::experience::NOISE_M;
 use super::information::information;
 use crate::identify::{Identifiability, Observation, Spectrum};
 use crate::model::JointLimits;
+use crate::units::mm_from_m;
 
 /// Indices of observability of a set of poses, from the singular values `σ` of its Jacobian over an independent subset of parameters,
 /// each column times the parameter's plausible deviation: millimetres of length a deviation.
@@ -130,6 +133,28 @@ pub enum Unfit {
         /// RMS error of the tool by what a design is plausibly off, metres.
         design_m: f64,
     },
+}
+
+impl fmt::Display for Unfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::FewPoses { poses, parameters } => write!(
+                f,
+                "{poses} poses for {parameters} parameters: a fit would take noise for parameters, expected three times as many poses"
+            ),
+            Self::Rank { rank, parameters } => write!(
+                f,
+                "these poses identify {rank} of {parameters} parameters: a fit would leave the others at their design values"
+            ),
+            Self::Noise { amplification, tool_m, design_m } => write!(
+                f,
+                "noise of the lengths reaches the tool {amplification:.0} times as large, {:.1} mm by usual noise; that is more than a design \
+                 is plausibly off, {:.1} mm, and a fit would do harm",
+                mm_from_m(tool_m),
+                mm_from_m(design_m)
+            ),
+        }
+    }
 }
 
 impl Unfit {
