@@ -101,8 +101,6 @@ fn a_plan_without_its_via_points_keeps_no_margins() {
     assert!(gap_m < 0.0 || travel_m < 0.0, "{gap_m} m, {travel_m} m: the test cannot fail");
 }
 
-/// The robot with parameters off as far as a design plausibly is: what a fit finds.
-
 /// Plans a robot's way, looks at it in the independent scene, and counts what it measures.
 fn measured_clear_of_all(robot: &Robot, rig: &Rig, options: &PlanOptions) -> usize {
     let plan = planned(robot, rig, options);

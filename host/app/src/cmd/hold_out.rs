@@ -7,8 +7,8 @@ use ballbar_calib::model::{self, Choice, Condition, Dataset, HeldOut, Rig};
 use miette::Diagnostic;
 use thiserror::Error;
 
-use super::inputs::parse_pairings;
 use super::outcome::CommandError;
+use super::pairings::parse_pairings;
 use crate::units::{m_from_mm, mm_from_m, tidy};
 
 /// Conditions of which a row has to meet one to be held out.

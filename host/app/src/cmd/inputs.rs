@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use ballbar_calib::model::{Dataset, HeldOut, PairingId, Rig, Robot};
+use ballbar_calib::model::{Dataset, HeldOut, Rig, Robot};
 use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
@@ -100,13 +100,6 @@ pub(super) fn check_max_rms_mm(limit: Option<f64>) -> Result<(), ListError> {
 /// Why a list on the command line cannot be used.
 #[derive(Debug, Error, Diagnostic)]
 pub(super) enum ListError {
-    /// A pairing that is not `chuck:sphere` of this rig.
-    #[error("`{0}` is no pairing of this rig, expected chuck:sphere as in A:1,B:2")]
-    #[diagnostic(help("The rig has chucks {1} and spheres {2}."))]
-    Pairing(String, String, String),
-    /// The same pairing twice.
-    #[error("pairing `{0}` stands there twice")]
-    RepeatedPairing(String),
     /// No pose has one of these pairings.
     #[error("no pose has one of the pairings {0}")]
     #[diagnostic(help("The poses have {1}."))]
@@ -148,24 +141,4 @@ pub(super) enum ListError {
         /// Joints of the robot.
         expected: usize,
     },
-}
-
-/// Reads `A:1,B:2`.
-pub(super) fn parse_pairings(text: &str, rig: &Rig) -> Result<Vec<PairingId>, CommandError> {
-    let mut pairings = Vec::new();
-    for word in text.split(',').map(str::trim) {
-        let ends = word.split_once(':').and_then(|(chuck, sphere)| Some((rig.chuck(chuck)?, rig.sphere(sphere)?)));
-        let Some((chuck, sphere)) = ends else {
-            let names = |points: &[ballbar_calib::model::NamedPoint]| {
-                points.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ")
-            };
-            return Err(ListError::Pairing(word.to_owned(), names(&rig.chucks), names(&rig.spheres)).into());
-        };
-        let pairing = PairingId { chuck, sphere };
-        if pairings.contains(&pairing) {
-            return Err(ListError::RepeatedPairing(word.to_owned()).into());
-        }
-        pairings.push(pairing);
-    }
-    Ok(pairings)
 }

@@ -21,6 +21,7 @@ mod log;
 mod lvdt;
 mod manual;
 mod outcome;
+mod pairings;
 mod paper;
 mod plan;
 mod plan_margins;

@@ -8,8 +8,9 @@ use ballbar_calib::plan::{Cell, CheckFound, Grid, Margins, Pace, PlanOptions, Pl
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
+use super::inputs::{ForceArgs, ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
+use super::pairings::parse_pairings;
 use super::plan_report::warnings;
 use super::report::{print, warn, write_file};
 use crate::documents::{CheckDocument, Least, PlanDocument};

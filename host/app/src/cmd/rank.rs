@@ -4,8 +4,9 @@ use ballbar_calib::identify::{Identifiability, bound_by_pairings, remarks};
 use clap::Args;
 use serde::Serialize;
 
-use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs, parse_pairings};
+use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs};
 use super::outcome::{CommandError, Outcome};
+use super::pairings::parse_pairings;
 use super::report::{Report, print};
 use crate::documents::NotIdentified;
 use crate::terminal::table::Columns;

@@ -7,8 +7,9 @@ use ballbar_calib::simulate::{ShellPose, Shells};
 use clap::Args;
 use serde::Serialize;
 
-use super::inputs::{ForceArgs, ListError, OutputArgs, parse_pairings};
+use super::inputs::{ForceArgs, ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
+use super::pairings::parse_pairings;
 use super::report::{Report, print, write_file};
 use crate::files::{FileKind, Output, open_rig, open_robot, write_poses};
 use crate::remedies::Remedied;

@@ -15,8 +15,9 @@ use serde::Serialize;
 use thiserror::Error;
 use watch::Watch;
 
-use super::inputs::{OutputArgs, parse_pairings};
+use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome, lock_error, record_error};
+use super::pairings::parse_pairings;
 use super::port::{PortArgs, StillnessArgs};
 use super::report::{Report, print, warn};
 use crate::board::{BoardLink, RobotOnBoard, StreamLosses, check_kinds};

@@ -12,8 +12,9 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::inputs::{ListError, OutputArgs, parse_pairings};
+use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome};
+use super::pairings::parse_pairings;
 use super::report::{Report, print};
 use crate::board::{NOMINAL_TRAVEL_M, parameter_set};
 use crate::files::{open_rig, open_robot};

@@ -15,8 +15,9 @@ use same_file::Handle;
 use thiserror::Error;
 
 use super::pose_mark::PoseMark;
+use super::record::Record;
 use super::segments::Segments;
-use crate::board::{Implausible, MessageFilter, StreamLosses};
+use crate::board::{MessageFilter, StreamLosses};
 
 /// Why a log cannot be read or written.
 #[derive(Debug, Error, Diagnostic)]
@@ -172,19 +173,6 @@ impl LogWriter {
 /// Milliseconds since 1970, UTC.
 pub(crate) fn unix_ms() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as u64)
-}
-
-/// One entry of a log.
-#[derive(Clone, Debug)]
-pub enum Record {
-    /// A whole frame, whose message is believed.
-    Message(Box<ToHost>),
-    /// A whole frame, whose message is not to be believed.
-    Refused(Implausible),
-    /// What the host noted of poses.
-    Mark(PoseMark),
-    /// A frame that is torn or damaged.
-    Damaged,
 }
 
 /// Reads a log from its beginning.

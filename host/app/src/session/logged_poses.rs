@@ -10,10 +10,11 @@ use std::rc::Rc;
 use ballbar::JointKind;
 use ballbar::wire::{Answer, Event, LogMark, ToHost};
 
-use super::log::{LogError, LogReader, Record};
+use super::log::{LogError, LogReader};
+use super::measured_pose::{Connection, MeasuredPose};
 use super::pose_file::time_us;
 use super::pose_mark::PoseMark;
-use super::recorder::{Connection, MeasuredPose};
+use super::record::Record;
 use super::settled_rule::{SettledFate, SettledRule};
 use crate::board::RobotOnBoard;
 

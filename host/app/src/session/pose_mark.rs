@@ -7,7 +7,7 @@ use ballbar::wire::{MAX_FRAME, decode, encode};
 use ballbar::{JointVector, StillnessCriteria};
 use serde::{Deserialize, Serialize};
 
-use super::recorder::{Connection, MeasuredPose};
+use super::measured_pose::{Connection, MeasuredPose};
 
 /// A mark of the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

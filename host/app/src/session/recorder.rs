@@ -1,97 +1,19 @@
 //! Takes what a board streams into a session's files.
 
-use std::fmt;
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{BoardHello, LogMark};
-use ballbar::{JointKind, JointVector, StillnessCriteria};
-use miette::Diagnostic;
-use serde::{Deserialize, Serialize};
-use thiserror::Error;
+use ballbar::{JointKind, StillnessCriteria};
 
-use super::description::{DescriptionError, DescriptionFile, Run};
+use super::description::{DescriptionFile, Run};
 use super::lock::SessionLock;
-use super::log::{LogError, LogWriter, unix_ms};
+use super::log::{LogWriter, unix_ms};
+use super::measured_pose::{Connection, MeasuredPose};
 use super::pose_file::{Erased, PoseFile, PoseFileError, SettledRow};
 use super::pose_mark::PoseMark;
+use super::record_error::RecordError;
 use super::recovery::Recovery;
 use super::{LOG_NAME, now};
-use crate::units::{mm_from_m, tidy};
-
-/// Why a recording cannot begin or go on.
-#[derive(Debug, Error, Diagnostic)]
-pub enum RecordError {
-    /// The log.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Log(#[from] LogError),
-    /// The description.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Description(#[from] DescriptionError),
-    /// The poses.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Poses(#[from] PoseFileError),
-    /// Poses while nobody has said what the bar joins.
-    #[error("a pose was to be kept without a connection of the bar")]
-    NotConnected,
-    /// A chuck and a sphere have names that a log has no room for.
-    #[error("the names of the chuck and the sphere have {bytes} bytes, which the log has no room for")]
-    #[diagnostic(help("A session's log holds what the bar joins. Give the chuck and the sphere shorter names."))]
-    LongNames {
-        /// Both together.
-        bytes: usize,
-    },
-}
-
-impl RecordError {
-    /// Whether it is what is there that cannot be used, and not what was to be written that could not be.
-    pub fn is_of_input(&self) -> bool {
-        matches!(
-            self,
-            Self::Log(LogError::NotALog { .. } | LogError::OtherVersion { .. })
-                | Self::Description(DescriptionError::Unreadable { .. })
-                | Self::Poses(
-                    PoseFileError::OtherColumns { .. } | PoseFileError::Unreadable { .. } | PoseFileError::Damaged { .. },
-                )
-                | Self::LongNames { .. }
-        )
-    }
-}
-
-/// Which ends the bar joined, and how long it is.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Connection {
-    /// Name of the chuck.
-    pub chuck: String,
-    /// Name of the sphere.
-    pub sphere: String,
-    /// Length of the bar at mid travel, metres.
-    pub bar_m: f64,
-}
-
-impl fmt::Display for Connection {
-    /// `A:1, 460 mm`.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}, {} mm", self.chuck, self.sphere, tidy(mm_from_m(self.bar_m)))
-    }
-}
-
-/// A pose to keep.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeasuredPose {
-    /// Encoder outputs, radians or metres.
-    pub q: JointVector<f64>,
-    /// Displacement of the bar from mid travel, metres.
-    pub displacement_m: f64,
-    /// Time of its middle by the board's clock, seconds.
-    pub t_s: f64,
-    /// How fast the length grew, metres per second, where the arm moved.
-    pub rate_m_s: Option<f64>,
-    /// Line of plan.csv that it was measured for.
-    pub plan_row: Option<usize>,
-}
 
 /// A session being recorded.
 ///

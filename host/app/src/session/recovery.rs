@@ -8,7 +8,7 @@ use super::POSES_NAME;
 use super::lock::SessionLock;
 use super::logged_poses::{LoggedPose, LoggedPoses};
 use super::pose_file::{PoseFile, PoseFileError, SettledRow};
-use super::recorder::RecordError;
+use super::record_error::RecordError;
 
 /// What there is to write into poses.csv; nothing is written yet.
 pub(super) struct Recovery {

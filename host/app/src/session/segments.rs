@@ -2,7 +2,7 @@
 
 use ballbar::wire::{LogMark, ToHost};
 
-use super::log::Record;
+use super::record::Record;
 
 /// Follows a log. A segment begins at every mark of recording and port, and at a hello that stands where none belongs: a recording keeps a hello right
 /// behind its mark, so that a mark before this one is damaged.

@@ -2,7 +2,7 @@
 
 use ballbar::{SettledPose, StillnessCriteria};
 
-use super::recorder::MeasuredPose;
+use super::measured_pose::MeasuredPose;
 use crate::board::RobotOnBoard;
 
 /// Follows the settled poses of a run.

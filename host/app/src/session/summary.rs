@@ -3,8 +3,9 @@
 use ballbar::wire::{Event, LogMark, ToHost};
 use serde::Serialize;
 
-use super::log::{LogError, LogReader, Record};
+use super::log::{LogError, LogReader};
 use super::logged_poses::LoggedPoses;
+use super::record::Record;
 use super::segments::Segments;
 use crate::board::StreamLosses;
 

@@ -7,7 +7,8 @@ use ballbar::JointKind;
 use ballbar::wire::{Answer, Event, ToHost};
 
 use super::super::description::{BoardDescription, RobotDescription};
-use super::super::log::{LogReader, Record};
+use super::super::log::LogReader;
+use super::super::record::Record;
 use super::super::segments::unix_ms_of;
 use super::LogExportError;
 use super::column::Column;

@@ -2,8 +2,8 @@
 
 use ballbar::wire::{Answer, Event, LogMark, Stream, ToHost};
 
-use super::super::log::Record;
 use super::super::pose_mark::PoseMark;
+use super::super::record::Record;
 use super::super::segments::{Segments, unix_ms_of};
 use super::entry::Entry;
 use super::shape::Shape;
