@@ -1,14 +1,12 @@
 //! `host-cal ports`: the serial ports of this machine.
 
 use clap::Args;
-use miette::Diagnostic;
 use serde::Serialize;
-use serialport::SerialPortType;
-use thiserror::Error;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
+use crate::board::{PortDescription, serial_ports};
 use crate::terminal::table::Columns;
 
 /// List the serial ports of this machine
@@ -19,44 +17,15 @@ pub(super) struct PortsArgs {
     output: OutputArgs,
 }
 
-#[derive(Debug, Error, Diagnostic)]
-#[error("the serial ports cannot be listed: {0}")]
-struct ListFailed(serialport::Error);
-
 #[derive(Serialize)]
 struct PortsReport {
-    ports: Vec<PortLine>,
-}
-
-#[derive(Serialize)]
-struct PortLine {
-    name: String,
-    /// usb, pci, bluetooth or unknown.
-    kind: &'static str,
-    manufacturer: Option<String>,
-    product: Option<String>,
-    serial_number: Option<String>,
+    ports: Vec<PortDescription>,
 }
 
 impl PortsArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
-        let ports = serialport::available_ports().map_err(ListFailed)?;
-        print(&PortsReport { ports: ports.into_iter().map(PortLine::from).collect() }, self.output.json)?;
+        print(&PortsReport { ports: serial_ports()? }, self.output.json)?;
         Ok(Outcome::Good)
-    }
-}
-
-impl From<serialport::SerialPortInfo> for PortLine {
-    fn from(port: serialport::SerialPortInfo) -> Self {
-        let line = |kind| Self { name: port.port_name.clone(), kind, manufacturer: None, product: None, serial_number: None };
-        match port.port_type {
-            SerialPortType::UsbPort(usb) => {
-                Self { manufacturer: usb.manufacturer, product: usb.product, serial_number: usb.serial_number, ..line("usb") }
-            }
-            SerialPortType::PciPort => line("pci"),
-            SerialPortType::BluetoothPort => line("bluetooth"),
-            SerialPortType::Unknown => line("unknown"),
-        }
     }
 }
 

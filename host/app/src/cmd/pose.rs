@@ -1,7 +1,7 @@
 //! `host-cal pose`: where the board says the tool is.
 
-use ballbar::Vector3;
-use ballbar::wire::{Answer, Command, CurrentPose};
+use ballbar::wire::CurrentPose;
+use ballbar::{JointKind, Vector3};
 use clap::Args;
 use serde::Serialize;
 
@@ -9,10 +9,9 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::port::PortArgs;
 use super::report::{Report, print, warn};
-use crate::board::{BoardError, Implausible, RobotOnBoard};
+use crate::board::{RobotOnBoard, current_pose};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, joints_text, mm_from_m};
-use ballbar::JointKind;
 
 /// The tool's true pose now, as the board computes it
 #[derive(Args)]
@@ -44,17 +43,7 @@ struct PoseReport {
 impl PoseArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let mut link = self.port.connect()?;
-        let Answer::CurrentPose(pose) = link.request(Command::CurrentPose)? else {
-            return Err(BoardError::WrongAnswer { command: "current pose" }.into());
-        };
-        let robot = RobotOnBoard::read(&mut link)?.map(|(robot, _)| robot);
-        let robot = robot.ok_or(BoardError::WrongAnswer { command: "read parameters" })?;
-        // The board has said twice how many joints its robot has.
-        let (found, expected) = (pose.q.len(), robot.kinds().len());
-        if found != expected {
-            let reason = Implausible::WrongCount { what: "joint values", found, expected };
-            return Err(BoardError::Implausible { command: "current pose", reason }.into());
-        }
+        let (pose, robot) = current_pose(&mut link)?;
         let report = PoseReport::new(&pose, &robot);
         if !report.homed {
             warn("not every encoder is homed since the board started: the pose means little. host-cal home PORT --q …");

@@ -143,11 +143,8 @@ struct ControllerError {
     error: std::io::Error,
 }
 
-/// Time between two looks at the board.
+/// Time between two looks at whether the user ends.
 const LOOK: Duration = Duration::from_millis(20);
-/// With --once: so long must the host have had nothing to read, and so long is waited for one that does not read.
-const DRAINED_LOOKS: u32 = 5;
-const READER_PATIENCE: Duration = Duration::from_secs(5);
 
 impl VirtualBoardArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
@@ -300,17 +297,11 @@ impl VirtualBoardArgs {
     /// Until the user ends it; with `--once` until nothing is left to do.
     fn wait(&self, board: &VirtualBoard, end: &EndRequest) {
         let began = Instant::now();
-        let mut done_at = None;
-        let mut drained = 0;
-        while !end.is_made() {
-            sleep(LOOK);
-            if !self.once || !board.is_done() {
-                continue;
-            }
-            drained = if board.is_drained() { drained + 1 } else { 0 };
-            let done_at = *done_at.get_or_insert_with(Instant::now);
-            if drained >= DRAINED_LOOKS || done_at.elapsed() > READER_PATIENCE {
-                break;
+        if self.once {
+            board.wait_until_read(end.stop_flag());
+        } else {
+            while !end.is_made() {
+                sleep(LOOK);
             }
         }
         let flips = board.bit_flips();

@@ -29,14 +29,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Sender, channel};
-use std::thread::JoinHandle;
-use std::time::Duration;
+use std::thread::{JoinHandle, sleep};
+use std::time::{Duration, Instant};
 
 use ballbar::wire::ParameterSet;
 use ballbar_firmware::Slots;
 use miette::Diagnostic;
 use thiserror::Error;
 
+use crate::deadline::StopFlag;
 use flash_file::FlashFile;
 use machine::{BitErrors, Machine};
 use pty::Pty;
@@ -122,6 +123,12 @@ pub struct VirtualBoard {
     thread: Option<JoinHandle<()>>,
 }
 
+/// Time between two looks at a board that is waited for.
+const LOOK: Duration = Duration::from_millis(20);
+/// So often must the host have had nothing to read, and so long is one waited for that does not read.
+const DRAINED_LOOKS: u32 = 5;
+const READER_PATIENCE: Duration = Duration::from_secs(5);
+
 /// A script for the thread.
 #[derive(Debug)]
 struct Play {
@@ -190,6 +197,22 @@ impl VirtualBoard {
     /// Whether a moment ago no byte was on its way to the host, as far as the system tells.
     pub fn is_drained(&self) -> bool {
         self.shared.is_drained.load(Ordering::Acquire)
+    }
+
+    /// Waits until all scripts are over and the host has read everything, or has read nothing for a while; no longer once the flag is set.
+    pub fn wait_until_read(&self, stop: &StopFlag) {
+        let (mut done_at, mut drained) = (None, 0);
+        while !stop.is_set() {
+            sleep(LOOK);
+            if !self.is_done() {
+                continue;
+            }
+            drained = if self.is_drained() { drained + 1 } else { 0 };
+            let done_at = *done_at.get_or_insert_with(Instant::now);
+            if drained >= DRAINED_LOOKS || done_at.elapsed() > READER_PATIENCE {
+                break;
+            }
+        }
     }
 
     /// Time that has passed for the robot since the start.
