@@ -9,6 +9,7 @@ mod framing;
 mod fuzz;
 mod message_filter;
 mod plausible_parameters;
+mod procedures;
 mod settling;
 mod slots;
 mod virtual_board;

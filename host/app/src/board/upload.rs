@@ -170,7 +170,8 @@ impl<'a> Upload<'a> {
     /// stays, if it has one.
     ///
     /// # Errors
-    /// [`UploadError`]. The board keeps what it had, but for [`UploadError::ReadBack`] of [`WhichSet::Active`].
+    /// [`UploadError`]. Until the commit the board keeps what it had; after it only [`UploadError::ReadBack`] of [`WhichSet::Active`] and
+    /// [`UploadError::Board`] can still come.
     pub fn put(&self, link: &mut BoardLink, on_step: &mut dyn FnMut(UploadStep)) -> Result<Uploaded, UploadError> {
         let robot = self.robot;
         let (joints, encoders) = (robot.chain.joints(), link.hello().encoders);

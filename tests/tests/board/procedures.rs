@@ -1,0 +1,96 @@
+//! What the procedures with a board refuse, whoever calls them: no caller has to think of a check.
+#![cfg(unix)]
+
+use std::num::NonZeroUsize;
+
+use ballbar::LvdtCurve;
+use ballbar::wire::{Answer, Command};
+use ballbar_tests::scenarios;
+use host_cal::board::{
+    Admission, BAUD, BoardLink, HomeError, Homing, LvdtError, LvdtFit, LvdtOrigin, RobotOnBoard, Upload, UploadError, UploadStep,
+    nominal_lvdt, store_lvdt,
+};
+use host_cal::files::open_robot;
+use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions};
+
+const VECTORS: NonZeroUsize = NonZeroUsize::new(20).unwrap();
+
+fn empty_board() -> (VirtualBoard, BoardLink) {
+    let board = VirtualBoard::start(VirtualBoardOptions::new(scenarios::plant(1), Pace::Free)).unwrap();
+    let link = BoardLink::connect(board.port(), BAUD).unwrap();
+    (board, link)
+}
+
+fn board_with_the_design() -> (VirtualBoard, BoardLink) {
+    let (board, mut link) = empty_board();
+    let design = open_robot("puma560").unwrap();
+    Upload::new(&design, Admission::Any, VECTORS).unwrap().put(&mut link, &mut |_| ()).unwrap();
+    (board, link)
+}
+
+fn is_homed(link: &mut BoardLink) -> bool {
+    let Answer::Status(status) = link.request(Command::Status).unwrap() else { panic!("a status") };
+    status.encoders.iter().any(|encoder| encoder.is_homed)
+}
+
+fn curve(link: &mut BoardLink) -> LvdtCurve {
+    RobotOnBoard::read(link).unwrap().unwrap().0.set().lvdt
+}
+
+#[test]
+fn a_design_is_uploaded_only_where_that_is_said_and_compared_before_it_is_stored() {
+    let (_board, mut link) = empty_board();
+    let design = open_robot("puma560").unwrap();
+    let refused = Upload::new(&design, Admission::Calibrated, VECTORS).unwrap_err();
+    assert!(matches!(refused, UploadError::NotCalibrated { .. }), "{refused}");
+
+    let mut steps = Vec::new();
+    let uploaded = Upload::new(&design, Admission::Any, VECTORS).unwrap().put(&mut link, &mut |step| steps.push(step)).unwrap();
+    assert_eq!((uploaded.replaced, uploaded.lvdt), (None, LvdtOrigin::Nominal));
+    assert!(!uploaded.stored.is_calibrated);
+    assert_eq!(steps[0], UploadStep::NominalLvdt);
+    assert_eq!(steps[1..], [UploadStep::Compared; VECTORS.get()]);
+    assert_eq!(uploaded.difference.vectors, VECTORS.get());
+}
+
+#[test]
+fn homing_refuses_what_cannot_be_the_boards_robot_and_presets_nothing() {
+    let (_board, mut link) = empty_board();
+    assert!(matches!(Homing::begin(&mut link), Err(HomeError::NoParameters)));
+
+    let (_board, mut link) = board_with_the_design();
+    let mut home = |q: &[f64], limits: Option<&str>| {
+        let limits = limits.map(|name| open_robot(name).unwrap());
+        Homing::begin(&mut link).unwrap().at(q, limits.as_ref())
+    };
+    for joints in [0, 5, 7, 100] {
+        let found = home(&vec![0.0; joints], None);
+        assert!(matches!(found, Err(HomeError::Joints { found, expected: 6 }) if found == joints), "{found:?}");
+    }
+    assert!(matches!(home(&[0.0; 6], Some("scara")), Err(HomeError::OtherRobot(_))));
+    for far in [f64::NAN, f64::INFINITY, 1e9] {
+        let found = home(&[0.0, 0.0, far, 0.0, 0.0, 0.0], None);
+        assert!(matches!(found, Err(HomeError::OutOfRange { .. })), "{found:?}");
+    }
+    assert!(!is_homed(&mut link));
+
+    // Beyond its limits the arm may stand all the same, and they are named.
+    let puma = open_robot("puma560").unwrap();
+    let homed = Homing::begin(&mut link).unwrap().at(&[9.0, 0.0, 0.0, 0.0, 0.0, 0.0], Some(&puma)).unwrap();
+    assert_eq!(homed.beyond_limits.map(|joints| joints.len()), Some(1));
+    assert!(is_homed(&mut link));
+}
+
+#[test]
+fn a_curve_is_stored_only_within_its_tolerance() {
+    let (_board, mut link) = board_with_the_design();
+    let (before, measured) = (curve(&mut link), nominal_lvdt(0.05));
+    let fit = LvdtFit { curve: measured, residuals_m: vec![0.1e-3, -0.6e-3] };
+    for tolerance_m in [0.5e-3, f64::NAN] {
+        let refused = store_lvdt(&mut link, &fit, tolerance_m).unwrap_err();
+        assert!(matches!(refused, LvdtError::TooFarOff { .. }), "{refused}");
+    }
+    assert_eq!(curve(&mut link), before);
+    store_lvdt(&mut link, &fit, 0.7e-3).unwrap();
+    assert_eq!(curve(&mut link), measured);
+}
