@@ -19,6 +19,7 @@
 //! | `platform` | what differs between operating systems |
 //! | [`terminal`] | what is printed, said, shown and typed |
 //! | [`text`] | what comes from outside, as a terminal may show it |
+//! | [`help`] | manual pages and completions of a command |
 //! | [`cmd`] | one file a subcommand: its arguments, what it runs, what it prints |
 //!
 //! SI units inside; millimetres and degrees in files and on screens, converted at the edge (see [`units`]).
@@ -32,6 +33,7 @@ pub mod deadline;
 pub mod documents;
 pub mod export;
 pub mod files;
+pub mod help;
 pub mod paper;
 mod platform;
 pub mod record;

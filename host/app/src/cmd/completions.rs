@@ -1,13 +1,13 @@
 //! `host-cal completions`: what a shell needs to complete this command.
 
-use clap::{Args, Command, ValueHint};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use serde::Serialize;
 
 use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print};
-use crate::files::{RIGS, ROBOTS};
+use crate::help::completion_script;
 
 /// Print a completion script for a shell
 #[derive(Args)]
@@ -31,33 +31,10 @@ struct CompletionsReport {
 impl CompletionsArgs {
     /// Prints the script for `command`, which is the whole of `host-cal`.
     pub(super) fn run(&self, command: Command) -> Result<Outcome, CommandError> {
-        let mut command = with_names(command, self.shell);
-        let name = command.get_name().to_owned();
-        let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut command, name, &mut script);
-        let mut script = String::from_utf8_lossy(&script).into_owned();
-        if self.shell == Shell::Bash {
-            // The generator spells a hyphen in the command's own name in two ways, and completes nothing behind a subcommand then
-            // (https://github.com/clap-rs/clap/issues/6421).
-            script = script.replace("host__subcmd__cal__", "host__cal__");
-        }
+        let script = completion_script(command, self.shell);
         print(&CompletionsReport { shell: self.shell.to_string(), script }, self.output.json)?;
         Ok(Outcome::Good)
     }
-}
-
-/// Says of every `--robot` and `--rig` what may stand there. The script for bash offers files where none of the given words fits; in
-/// the other shells words would shut files out.
-fn with_names(command: Command, shell: Shell) -> Command {
-    let command = command.mut_args(|arg| {
-        let builtin: Vec<&str> = match arg.get_id().as_str() {
-            "robot" | "plan_robot" => ROBOTS.iter().map(|(name, _)| *name).collect(),
-            "rig" => RIGS.iter().map(|(name, _)| *name).collect(),
-            _ => return arg,
-        };
-        if shell == Shell::Bash { arg.value_parser(builtin) } else { arg.value_hint(ValueHint::FilePath) }
-    });
-    command.mut_subcommands(|subcommand| with_names(subcommand, shell))
 }
 
 impl Report for CompletionsReport {
