@@ -1,4 +1,4 @@
-//! Names of the files in a session (see [`crate::session`]): what is written elsewhere takes none of them.
+//! Names of the files in a session. They stand here since whatever else is written takes none of them.
 
 /// Names of the files in a session: no command writes anything else under them.
 pub(crate) const FILE_NAMES: [&str; 7] = [LOG_NAME, DESCRIPTION_NAME, POSES_NAME, PLAN_NAME, ROBOT_NAME, RIG_NAME, LOCK_NAME];

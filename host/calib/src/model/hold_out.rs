@@ -92,3 +92,77 @@ impl PoseRow {
         self.bar_m.or_else(by_length)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use ballbar::{JointVector, Measurement, Vector3};
+
+    use super::*;
+    use crate::model::{Bar, NamedPoint, Solids};
+
+    fn rig() -> Rig {
+        let point = |name: &str, x_m| NamedPoint { name: name.to_owned(), position_m: Vector3::new(x_m, 0.0, 0.0) };
+        Rig {
+            chucks: vec![point("A", 0.5), point("B", 0.7)],
+            spheres: vec![point("1", 0.1)],
+            bar: Some(Bar { lengths_m: vec![0.46, 0.61], travel_m: 0.08 }),
+            solids: Solids::default(),
+        }
+    }
+
+    /// Rows by chuck and length; the last one says itself which bar it was measured with, and that it belongs to a part.
+    fn dataset(rig: &Rig) -> Dataset {
+        let row = |(chuck, length_m)| {
+            let pairing = PairingId { chuck, sphere: 0 };
+            PoseRow {
+                pairing,
+                measurement: Measurement { pairing: rig.pairing(pairing), q: JointVector::zero(), length_m, weight: 1.0 },
+                sigma_m: None,
+                set: None,
+                t_s: None,
+                bar_m: None,
+                motion: None,
+                file: 0,
+                line: 0,
+                number: 0,
+            }
+        };
+        let mut rows: Vec<PoseRow> = [(0, 0.45), (0, 0.62), (1, 0.46), (1, 0.54)].map(row).into();
+        rows[3].bar_m = Some(0.61);
+        rows[3].set = Some("again".to_owned());
+        Dataset::new("numbers", rows).unwrap()
+    }
+
+    fn apart(conditions: &[Condition]) -> Vec<usize> {
+        let rig = rig();
+        let HeldOut { apart, others } = dataset(&rig).hold_out(&rig, conditions).unwrap();
+        assert_eq!(apart.rows.len() + others.rows.len(), 4);
+        apart.rows.iter().map(|row| row.number).collect()
+    }
+
+    #[test]
+    fn a_row_that_meets_one_condition_is_kept_apart() {
+        assert_eq!(apart(&[Condition::Bar(0.61)]), [2, 4]);
+        assert_eq!(apart(&[Condition::Pairing(PairingId { chuck: 0, sphere: 0 })]), [1, 2]);
+        assert_eq!(apart(&[Condition::Set("again".to_owned())]), [4]);
+        assert_eq!(apart(&[Condition::Bar(0.46), Condition::Set("again".to_owned())]), [1, 3, 4]);
+    }
+
+    #[test]
+    fn neither_side_may_be_empty_and_what_there_is_to_choose_from_is_said() {
+        let rig = rig();
+        let of = |conditions: &[Condition]| dataset(&rig).hold_out(&rig, conditions).unwrap_err();
+        let HoldOutError::Nothing(choice) = of(&[Condition::Bar(0.3)]) else { panic!("no bar has 0.3 m") };
+        assert_eq!((choice.bars_m, choice.sets), (vec![0.46, 0.61, 0.46, 0.61], vec!["again".to_owned()]));
+        assert!(matches!(of(&[Condition::Bar(0.46), Condition::Bar(0.61)]), HoldOutError::Everything(_)));
+    }
+
+    #[test]
+    fn rows_are_shared_that_have_the_same_ends_and_values() {
+        let rig = rig();
+        let (all, mut moved) = (dataset(&rig), dataset(&rig));
+        moved.rows[0].measurement.length_m += 1e-9;
+        moved.rows[1].pairing.chuck = 1;
+        assert_eq!((all.shared_rows(&all), moved.shared_rows(&all)), (4, 2));
+    }
+}
