@@ -3,7 +3,7 @@
 use core::fmt;
 use core::str::FromStr;
 
-use serde::de::{Error, Visitor};
+use serde::de::{Error, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::{JointKind, MAX_JOINTS, PARAMETERS_PER_JOINT};
@@ -130,7 +130,7 @@ impl Visitor<'_> for NameVisitor {
     }
 
     fn visit_str<E: Error>(self, name: &str) -> Result<Parameter, E> {
-        name.parse().map_err(E::custom)
+        name.parse().map_err(|_| E::invalid_value(Unexpected::Str(name), &self))
     }
 }
 

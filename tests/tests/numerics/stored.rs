@@ -1,5 +1,6 @@
 //! What the library stores comes back, and what is no robot, rig or dataset does not.
 
+use ballbar_calib::Parameter;
 use ballbar_calib::assess::{Assessment, Evidence};
 use ballbar_calib::designs;
 use ballbar_calib::identify::{Fit, FitOptions, fit};
@@ -95,6 +96,7 @@ fn what_is_none_is_not_read_as_one() {
     assert!(refused::<Robot>(&robot).starts_with("joint 1 cannot be limited to 7 …"));
     robot["chain"]["parameters"].as_array_mut().unwrap().pop();
     assert_eq!(refused::<Robot>(&robot), "53 parameters, expected 54");
+    assert!(refused::<Parameter>(&json!("gamma99")).contains("gamma99"));
     let mut rig = serde_json::to_value(&puma.rig).unwrap();
     rig["spheres"][2]["name"] = json!("1");
     assert_eq!(refused::<Rig>(&rig), "two spheres are called `1`");

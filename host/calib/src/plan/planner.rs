@@ -184,7 +184,7 @@ impl Plan {
             let number = i + 1;
             PoseRow { bar_m: Some(row.bar_m), line: number, number, ..PoseRow::of(row.pairing, measurement) }
         };
-        Dataset { rows: measured.enumerate().map(pose).collect(), files: Vec::new() }
+        Dataset { rows: measured.enumerate().map(pose).collect(), files: vec!["plan".to_owned()] }
     }
 }
 
