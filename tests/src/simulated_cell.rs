@@ -39,6 +39,11 @@ const QUICK: [&str; 6] = ["--speed-deg-s", "90", "--rate", "200", "--hold-ms", "
 /// A short plan: three pairings, eight poses each, one bar. Its text.
 pub static SHORT_PLAN: LazyLock<String> = LazyLock::new(|| plan_text(8, &[0.46], &[(0, 0), (1, 1), (2, 2)]));
 
+/// How many poses a plan's text has to measure.
+pub fn poses_of(plan: &str) -> usize {
+    plan.lines().filter(|line| line.starts_with("measure,")).count()
+}
+
 /// A plan's text: poses of each shell, bars in metres, chucks and spheres by index.
 pub fn plan_text(poses_per_shell: usize, bars_m: &[f64], pairings: &[(usize, usize)]) -> String {
     let (design, rig) = (design(), rig());

@@ -6,6 +6,7 @@
 //! | [`board`] | the host's end of the wire: port, requests, losses |
 //! | [`robot_link`] | robot controllers: how a robot is moved, whoever made it |
 //! | [`collect`] | walks a plan: moves the robot, waits, measures, keeps |
+//! | `operator` | who stands at the robot while a plan is walked: what is asked, and what is typed |
 //! | [`session`] | a recording: its log, its poses, what it was recorded with |
 //! | [`record`] | watches what a board streams, and keeps it; gets over a lost port |
 //! | [`files`] | robots, rigs and measured poses: reading with located errors, writing by rename |
@@ -33,6 +34,7 @@ pub mod deadline;
 pub mod documents;
 pub mod export;
 pub mod files;
+mod operator;
 pub mod paper;
 mod platform;
 pub mod record;

@@ -7,7 +7,7 @@ use std::time::Duration;
 use ballbar::JointVector;
 use ballbar_tests::command::host_cal_command;
 use ballbar_tests::crew::Crew;
-use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, column, design, plant, quick, rig};
+use ballbar_tests::simulated_cell::{SHORT_PLAN, SimulatedCell, column, design, plant, poses_of, quick, rig};
 use host_cal::collect::{CollectError, Ended, Event, Operator, RowState, Wish};
 use host_cal::robot_link::sim::{SimLink, SimRequest};
 use host_cal::robot_link::{JointSpeed, LinkError, MoveState, RobotLink};
@@ -17,11 +17,6 @@ const SIGMA_M: f64 = 7e-5;
 
 fn cell() -> SimulatedCell {
     SimulatedCell::start(plant(3), SIGMA_M, &SHORT_PLAN)
-}
-
-/// How many poses the short plan has.
-fn planned() -> usize {
-    SHORT_PLAN.lines().filter(|line| line.starts_with("measure,")).count()
 }
 
 fn measured_lines(cell: &SimulatedCell, session: &str) -> Vec<String> {
@@ -34,7 +29,10 @@ fn a_plan_is_walked_to_its_end_without_a_hand_on_it() {
     let run = cell.collect("session", &["--json", "--temperature-c", "21.5"]);
     assert_eq!(run.code, 0, "{}", run.transcript());
     let report = run.json();
-    assert_eq!((&report["status"], &report["measured"], &report["left"]), (&"done".into(), &planned().into(), &0.into()));
+    assert_eq!(
+        (&report["status"], &report["measured"], &report["left"]),
+        (&"done".into(), &poses_of(&SHORT_PLAN).into(), &0.into())
+    );
     assert_eq!(report["losses"]["missing"], 0);
     assert!(report["repeats"].as_array().unwrap().iter().all(|repeat| repeat["difference_mm"].as_f64().unwrap().abs() < 1.0));
     cell.assert_all_measured("session");
@@ -46,8 +44,8 @@ fn a_plan_is_walked_to_its_end_without_a_hand_on_it() {
 
     // The session alone is enough for the others.
     let rank = cell.host_cal(&["rank", "session", "--json"]);
-    assert_eq!(rank.json()["rank"], planned(), "{}", rank.transcript());
-    assert_eq!(column(&cell.path("session"), "bar_mm"), vec!["460"; planned()]);
+    assert_eq!(rank.json()["rank"], poses_of(&SHORT_PLAN), "{}", rank.transcript());
+    assert_eq!(column(&cell.path("session"), "bar_mm"), vec!["460"; poses_of(&SHORT_PLAN)]);
 
     // There is nothing left to do.
     let run = cell.collect("session", &["--json"]);
@@ -139,7 +137,7 @@ fn poses_can_be_erased_skipped_and_waited_with() {
     let mut lines = measured_lines(&cell, "session");
     lines.sort();
     lines.dedup();
-    assert_eq!(lines.len(), planned() - 1, "what was skipped stays so");
+    assert_eq!(lines.len(), poses_of(&SHORT_PLAN) - 1, "what was skipped stays so");
 }
 
 #[test]

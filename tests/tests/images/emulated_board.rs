@@ -7,7 +7,7 @@ use ballbar::Kinematics;
 use ballbar_firmware::ENCODERS;
 use ballbar_tests::emulator::{EmulatedBoard, is_skipped};
 use ballbar_tests::scenarios::{self, Bench, host_cal, host_cal_run};
-use ballbar_tests::simulated_cell::{self, DESIGN, SHORT_PLAN, SimulatedCell};
+use ballbar_tests::simulated_cell::{self, DESIGN, SHORT_PLAN, SimulatedCell, poses_of};
 use host_cal::files::read_poses;
 use host_cal::virtual_board::{Driven, Plant, Script, driver};
 use serde_json::Value;
@@ -192,7 +192,7 @@ fn a_plan_is_collected() {
     let run = cell.collect_as("session", &[&["--speed-deg-s", "90", "--rate", "200", "--json"][..], &still].concat());
     assert_eq!(run.code, 0, "{}", run.transcript());
     let report = run.json();
-    assert_eq!((&report["measured"], &report["troubles"]), (&24.into(), &serde_json::json!([])));
+    assert_eq!((&report["measured"], &report["troubles"]), (&poses_of(&SHORT_PLAN).into(), &serde_json::json!([])));
     assert_eq!((&report["losses"]["missing"], &report["losses"]["overruns"]), (&0.into(), &0.into()));
     cell.assert_all_measured("session");
 

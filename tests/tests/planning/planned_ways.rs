@@ -267,6 +267,11 @@ fn nothing_moves_along_a_plan_that_leads_into_something() {
         CheckedPlan::new(&cell, &rows).map(|plan| plan.rows().len())
     };
     assert_eq!(refused(&|_| ()), Ok(rows.len()));
+    for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        assert_eq!(refused(&|rows| rows[3].q.as_array_mut()[2] = number), Err(UnsafePlan::NotFinite { row: 4 }));
+        assert_eq!(refused(&|rows| rows[0].bar_m = number), Err(UnsafePlan::NotFinite { row: 1 }));
+    }
+    assert_eq!(refused(&|rows| rows[5].pairing.sphere = 7), Err(UnsafePlan::OtherRig { row: 6 }));
     assert_eq!(refused(&|rows| rows[3].q.as_array_mut()[5] += 10.0), Err(UnsafePlan::Limits));
     assert_eq!(refused(&|rows| rows.retain(|row| row.kind == RowKind::Measure)), Err(UnsafePlan::Travel));
     // Without the bar, through a posture in which something is in something.

@@ -109,7 +109,7 @@ pub fn fit_lvdt(points: &[LvdtPoint], degree: usize) -> Result<LvdtFit, LvdtFitE
     Ok(LvdtFit { curve, residuals_m })
 }
 
-/// Whether so many lengths are enough for a polynomial of `degree`: to be known before they are measured.
+/// Whether so many lengths are enough for a polynomial of `degree`; asked before any of them is measured.
 ///
 /// # Errors
 /// [`LvdtFitError::TooFew`].

@@ -6,7 +6,7 @@ mod report;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace, UnsafePlan};
+use ballbar_calib::plan::{Cell, CheckedPlan, Margins, Pace, PlanRow, UnsafePlan};
 use clap::Args;
 use miette::Diagnostic;
 use mover::MoverArgs;
@@ -23,12 +23,12 @@ use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, Programs, TrackOptions,
     read_board, remove_lag,
 };
+use crate::operator::{Hand, Still, Terminal};
 use crate::remedies::Remedied;
 use crate::robot_link::JointSpeed;
 use crate::robot_link::sim::SimHand;
 use crate::session::{Given, Recorder, Run, SessionInputs, SessionLock};
 use crate::terminal::EndRequest;
-use crate::terminal::operator::{Hand, Still, Terminal};
 use crate::units::m_from_mm;
 
 /// Walk a plan: move the robot from pose to pose, wait until it stands, and keep what the bar measures
@@ -114,7 +114,18 @@ enum ArgumentError {
     ContinuousByHand,
     #[error("the plan has {0}")]
     #[diagnostic(help("Nothing was moved. `host-cal plan --check` says more; plan again, or correct the rig's [solids]."))]
-    UnsafePlan(UnsafePlan),
+    UnsafePlan(String),
+}
+
+/// What is wrong with a plan, by the lines of its file.
+fn in_lines(found: &UnsafePlan, rows: &[PlanRow]) -> String {
+    let line = |row: usize| rows.get(row - 1).map_or(0, |row| row.line);
+    match *found {
+        UnsafePlan::NotFinite { row } => format!("a number that is none in line {}", line(row)),
+        UnsafePlan::OtherRig { row } => format!("a chuck or a sphere that this rig has not, in line {}", line(row)),
+        UnsafePlan::Contact { contact, row } => format!("{contact} in one another, on the way to line {}", line(row)),
+        UnsafePlan::Limits | UnsafePlan::Travel => found.to_string(),
+    }
 }
 
 impl CollectArgs {
@@ -123,7 +134,8 @@ impl CollectArgs {
         let files = SessionInputs::open(&self.session, self.given())?;
         let travel_m = files.rig.bar.as_ref().ok_or(ListError::NoBar)?.travel_m;
         let cell = Cell::new(&files.robot, &files.rig, travel_m, Margins::default(), Pace::default()).map_err(Remedied)?;
-        let plan = CheckedPlan::new(&cell, &files.rows).map_err(ArgumentError::UnsafePlan)?;
+        let plan =
+            CheckedPlan::new(&cell, &files.rows).map_err(|found| ArgumentError::UnsafePlan(in_lines(&found, &files.rows)))?;
 
         let mut mover = self.mover.open(files.robot.chain.joint_kinds())?;
         if self.continuous && !matches!(mover, Mover::Link(_)) {

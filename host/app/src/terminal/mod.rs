@@ -1,9 +1,8 @@
-//! The terminal, or what stands in its place: what is printed and said, tables, progress, the steady screen, what is typed, the
-//! operator of a collection, and the wish to end. The only way to stdout and stderr.
+//! The terminal, or what stands in its place: what is printed and said, tables, progress, the steady screen, what is typed, and the wish
+//! to end. The only way to stdout and stderr.
 
 mod end_request;
 mod given_back;
-pub(crate) mod operator;
 pub(crate) mod out;
 mod progress;
 pub(crate) mod screen;

@@ -72,7 +72,7 @@ impl PoseRow {
     /// [`PoseRow::sigma_m`]. [`Dataset::new`] numbers and weighs it.
     ///
     /// # Errors
-    /// [`PoseError`] when the rig has no such pairing, or a number is none that can be measured.
+    /// [`PoseError`] when the rig has no such pairing, or a number is not finite or out of range.
     pub fn new(rig: &Rig, pairing: PairingId, q: JointVector<f64>, length_m: f64) -> Result<Self, PoseError> {
         if !rig.has(pairing) {
             return Err(PoseError::NoSuchPairing(pairing));

@@ -41,9 +41,13 @@ pub struct Found {
     pub nearest_row: usize,
 }
 
-/// Looks at a plan in steps of a joint of at most `step`, radians or metres, and with so many plausible robots.
+/// Looks at a plan in steps of a joint of at most `step`, radians or metres (no finer than a tenth of a milliradian or millimetre), and
+/// with so many plausible robots.
 ///
 /// The bar counts as attached between rows of one pairing and bar that both have a length.
+///
+/// # Panics
+/// When a row's pairing is of another rig: [`super::CheckedPlan`] refuses such plans.
 pub fn check(cell: &Cell<'_>, rows: &[PlanRow], step: f64, plausible_robots: usize, seed: u64, tell: &Tell<'_>) -> Found {
     let progress = Ongoing::begin(Stage::Check, rows.len() + plausible_robots, tell);
     let mut found = Found {
@@ -102,6 +106,8 @@ impl Found {
 
 /// Joint vectors between two, without the ends.
 fn between(a: &JointVector<f64>, b: &JointVector<f64>, step: f64) -> Vec<JointVector<f64>> {
+    const FINEST: f64 = 1e-4;
+    let step = if step > FINEST { step } else { FINEST };
     let largest = a.as_array().iter().zip(b.as_array()).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let pieces = (largest / step).ceil().max(1.0) as usize;
     let at = |piece: usize| {

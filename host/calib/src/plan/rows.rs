@@ -85,7 +85,7 @@ impl PlanRow {
     /// the bar's length at mid travel, metres. Whether the robot may go there, [`super::CheckedPlan::new`] says.
     ///
     /// # Errors
-    /// [`PoseError`] when the rig has no such pairing, or a number is none that can be measured.
+    /// [`PoseError`] when the rig has no such pairing, or a number is not finite or out of range.
     pub fn with_bar(
         robot: &Robot,
         rig: &Rig,

@@ -6,13 +6,13 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 
 use ballbar::JointKind;
 
-use super::screen::{Key, Screen};
-use super::{EndRequest, typed_lines};
 use crate::collect::{Event, Operator, Wish};
 use crate::deadline::StopFlag;
 use crate::robot_link::LinkError;
 use crate::robot_link::sim::{SimHand, SimRequest};
 use crate::session::Connection;
+use crate::terminal::screen::{Key, Screen};
+use crate::terminal::{EndRequest, typed_lines};
 use crate::units::{fixed, joints_text, mm_from_m};
 pub(crate) use picture::Still;
 use picture::{Next, picture};
