@@ -162,6 +162,11 @@ impl UrPeer {
         self.shared.change_pace(|world| world.is_paused = is_paused);
     }
 
+    /// Lets RTDE say nothing, or go on.
+    pub fn set_silent(&self, is_silent: bool) {
+        self.shared.world().is_silent = is_silent;
+    }
+
     /// Switches between local and remote control. Into local, connections that take programs are closed; into remote, those that
     /// were made in local stay, and stay deaf.
     pub fn set_remote(&self, is_remote: bool) {

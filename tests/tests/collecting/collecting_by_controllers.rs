@@ -1,11 +1,14 @@
 //! A plan walked through the links to real controllers' emulations, with the simulated robot following what they do.
 #![cfg(unix)]
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use ballbar::JointVector;
 use ballbar_tests::command::host_cal_command;
 use ballbar_tests::crew::Crew;
 use ballbar_tests::peers::ur::{UrPeer, UrPeerOptions};
@@ -17,7 +20,7 @@ use host_cal::collect::{CollectError, Ended, Event, Operator, Wish};
 use host_cal::robot_link::sim::{SimClient, SimRequest};
 use host_cal::robot_link::urscript::UrLink;
 use host_cal::robot_link::val::{VAL_BAUD, ValLink, ValSpeeds};
-use host_cal::robot_link::{LinkError, Patience, RobotLink};
+use host_cal::robot_link::{Intervention, JointSpeed, LinkError, MoveState, Patience, RobotLink};
 
 /// How many times faster than in the world the controllers go.
 const PACE: f64 = 10.0;
@@ -233,6 +236,104 @@ fn a_speed_slider_at_zero_is_said_and_waited_for() {
     assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Quit, "{:?}", slides.crew.told);
     assert!(slides.crew.told.iter().any(|words| words.contains("the robot goes on")), "{:?}", slides.crew.told);
     assert_eq!(column(&cell.path("session"), "plan_row").len(), 3);
+}
+
+/// A link that notes when it was listened to.
+struct Noted {
+    link: UrLink,
+    heard_at: Rc<Cell<Instant>>,
+}
+
+impl RobotLink for Noted {
+    fn name(&self) -> String {
+        self.link.name()
+    }
+    fn start_move(&mut self, q: &JointVector<f64>, speed: &JointSpeed) -> Result<(), LinkError> {
+        self.link.start_move(q, speed)
+    }
+    fn poll(&mut self) -> Result<MoveState, LinkError> {
+        self.link.poll()
+    }
+    fn joints(&mut self) -> Result<Option<JointVector<f64>>, LinkError> {
+        self.link.joints()
+    }
+    fn stop(&mut self) -> Result<(), LinkError> {
+        self.link.stop()
+    }
+    fn recover(&mut self) -> Result<(), LinkError> {
+        self.link.recover()
+    }
+    fn intervention(&mut self) -> Result<Option<Intervention>, LinkError> {
+        self.link.intervention()
+    }
+    fn release(&mut self) -> Result<(), LinkError> {
+        self.link.release()
+    }
+    fn listen(&mut self) -> Result<(), LinkError> {
+        self.heard_at.set(Instant::now());
+        self.link.listen()
+    }
+}
+
+/// Takes a second for everything, and looks whether the controller is heard meanwhile.
+struct TakesItsTime {
+    crew: Crew,
+    heard_at: Rc<Cell<Instant>>,
+    next: Option<(Instant, Wish)>,
+    /// Wishes that came after the controller was heard, and those before which it was not.
+    heard: Vec<Wish>,
+    unheard: Vec<Wish>,
+}
+
+impl Operator for TakesItsTime {
+    fn tell(&mut self, event: &Event<'_>) -> Result<(), LinkError> {
+        self.crew.tell(event)
+    }
+
+    fn is_present(&self) -> bool {
+        true
+    }
+
+    fn wish(&mut self) -> Option<Wish> {
+        let now = Instant::now();
+        let Some((due, wish)) = self.next.take() else {
+            self.next = self.crew.wish().map(|wish| (now + Duration::from_secs(1), wish));
+            return None;
+        };
+        if now < due {
+            self.next = Some((due, wish));
+            return None;
+        }
+        let is_heard = self.heard_at.get().elapsed() < Duration::from_millis(400);
+        if is_heard {
+            self.heard.push(wish)
+        } else {
+            self.unheard.push(wish)
+        }
+        Some(wish)
+    }
+}
+
+#[test]
+fn the_controller_is_heard_while_a_person_is_waited_for() {
+    let (cell, peer) = (cell(), ur());
+    let _shadow = Shadow::start(&cell, peer.joints());
+    let link = UrLink::connect("127.0.0.1", peer.ports(), Patience::default()).unwrap();
+    let heard_at = Rc::new(Cell::new(Instant::now()));
+    let mut link = Noted { link, heard_at: Rc::clone(&heard_at) };
+    peer.next(Mishap::FaultsHalfWay);
+    let crew = Crew::wishing(&cell, &[(1, Wish::Pause), (1, Wish::Resume), (2, Wish::Quit)]).looking();
+    let mut operator = TakesItsTime { crew, heard_at, next: None, heard: Vec::new(), unheard: Vec::new() };
+    let collected = cell.collect_with("session", Some(&mut link), &mut operator, quick());
+    assert_eq!(*collected.ended.as_ref().unwrap(), Ended::Quit, "{:?}", operator.crew.told);
+    assert_eq!(operator.unheard, [], "after {:?}", operator.heard);
+    for wish in [Wish::Confirm, Wish::Pause, Wish::Resume, Wish::Quit] {
+        assert!(operator.heard.contains(&wish), "{wish:?}: {:?}", operator.heard);
+    }
+    for told in ["Detach", "Inspect", "Attach"] {
+        assert!(operator.crew.told.iter().any(|words| words.starts_with(told)), "{told}: {:?}", operator.crew.told);
+    }
+    assert_eq!(peer.problems(), [""; 0]);
 }
 
 /// Arguments of `host-cal collect` by a controller.

@@ -3,6 +3,7 @@
 mod dribbling;
 mod ur;
 mod ur_safety;
+mod ur_waits;
 #[cfg(unix)]
 mod val;
 

@@ -9,6 +9,7 @@ use super::collector::{Bar, Collector};
 use super::errors::CollectError;
 use super::ledger::Joined;
 use super::operator::{Event, Wish};
+use super::talker::Talker;
 use crate::units::{mm_from_m, tidy};
 
 /// How long the LVDT may take to show a bar that was attached.
@@ -22,17 +23,17 @@ const STEADY_US: u64 = 200_000;
 
 impl Collector<'_, '_> {
     /// Has the bar attached, and looks whether it is the right one. True when the operator wants to end instead.
-    pub(super) fn attach(&mut self, joined: Joined) -> Result<bool, CollectError> {
-        if matches!(self.bar, Bar::On(_)) && self.detach()? {
+    pub(super) fn attach(&mut self, joined: Joined, talker: &mut dyn Talker) -> Result<bool, CollectError> {
+        if matches!(self.bar, Bar::On(_)) && self.detach(talker)? {
             return Ok(true);
         }
         let connection = self.connection(joined);
         for attempt in 1.. {
             self.operator.tell(&Event::Attach(&connection))?;
-            if self.wait_for_confirmation()? {
+            if self.wait_for_confirmation(talker)? {
                 return Ok(true);
             }
-            match self.look_at_connection(joined) {
+            match self.look_at_connection(joined, talker) {
                 Ok(()) => break,
                 Err(wrong @ CollectError::WrongConnection { .. }) if attempt < ATTEMPTS => self.trouble(wrong.to_string())?,
                 Err(error) => return Err(error),
@@ -44,7 +45,7 @@ impl Collector<'_, '_> {
     }
 
     /// Has the bar taken off, unless it is known to be off. True when the operator wants to end instead.
-    pub(super) fn detach(&mut self) -> Result<bool, CollectError> {
+    pub(super) fn detach(&mut self, talker: &mut dyn Talker) -> Result<bool, CollectError> {
         let connection = match self.bar {
             Bar::Off => return Ok(false),
             Bar::Unknown => None,
@@ -54,7 +55,7 @@ impl Collector<'_, '_> {
         let before_m = self.board.ask()?.displacement_m;
         for attempt in 1..=ATTEMPTS {
             self.operator.tell(&Event::Detach(connection.as_ref()))?;
-            if self.wait_for_confirmation()? {
+            if self.wait_for_confirmation(talker)? {
                 return Ok(true);
             }
             let confirmed_us = self.board.ask()?.t_us;
@@ -94,9 +95,9 @@ impl Collector<'_, '_> {
     }
 
     /// True when the operator wants to end.
-    pub(super) fn wait_for_confirmation(&mut self) -> Result<bool, CollectError> {
+    pub(super) fn wait_for_confirmation(&mut self, talker: &mut dyn Talker) -> Result<bool, CollectError> {
         loop {
-            self.listen()?;
+            self.listen(talker)?;
             match self.operator.wish() {
                 Some(Wish::Confirm | Wish::Resume) => return Ok(false),
                 Some(Wish::Quit) => return Ok(true),
@@ -106,11 +107,11 @@ impl Collector<'_, '_> {
         }
     }
 
-    fn look_at_connection(&mut self, joined: Joined) -> Result<(), CollectError> {
+    fn look_at_connection(&mut self, joined: Joined, talker: &mut dyn Talker) -> Result<(), CollectError> {
         let (began, confirmed_us) = (Instant::now(), self.board.ask()?.t_us);
         let mut shown_since_us = None;
         while began.elapsed() < PATIENCE {
-            self.listen()?;
+            self.listen(talker)?;
             let view = self.board.view_after(confirmed_us)?;
             match view.displacement_m {
                 None => shown_since_us = None,

@@ -15,6 +15,7 @@ use super::follow::Guide;
 use super::ledger::{Joined, Ledger, RowState};
 use super::operator::{Event, Measured, Operator, Wish};
 use super::repeat::Repeat;
+use super::talker::Talker;
 use super::track::TrackOptions;
 use crate::board::{BoardError, StreamLosses};
 use crate::robot_link::{JointSpeed, LinkError};
@@ -126,12 +127,15 @@ pub struct Collector<'a, 'o> {
     rows_done: usize,
     began: Instant,
     told: Instant,
+    heard_talker: Instant,
 }
 
 /// Rows that may be missed one after the other before something must be wrong for all of them.
 const MISSED_IN_A_ROW: usize = 3;
 /// How often the operator is told how the arm stands.
 const TELL: Duration = Duration::from_millis(100);
+/// How often who talks besides the board is heard.
+const HEAR: Duration = Duration::from_millis(50);
 
 impl<'a, 'o> Collector<'a, 'o> {
     /// At a plan, of which some may be done, with a board that streams.
@@ -156,6 +160,7 @@ impl<'a, 'o> Collector<'a, 'o> {
             rows_done: 0,
             began,
             told: began,
+            heard_talker: began,
         }
     }
 
@@ -185,9 +190,13 @@ impl<'a, 'o> Collector<'a, 'o> {
         (Summary { losses, ..self.summary }, self.ledger, closed)
     }
 
-    /// Hears the board, and shows the operator the arm now and then.
-    pub(super) fn listen(&mut self) -> Result<(), CollectError> {
+    /// Hears the board and who else talks, and shows the operator the arm now and then.
+    pub(super) fn listen(&mut self, talker: &mut dyn Talker) -> Result<(), CollectError> {
         self.board.listen()?;
+        if self.heard_talker.elapsed() > HEAR {
+            talker.hear()?;
+            self.heard_talker = Instant::now();
+        }
         if let Some(refusal) = self.board.take_refusal() {
             self.trouble(refusal)?;
         }
@@ -227,13 +236,17 @@ impl<'a, 'o> Collector<'a, 'o> {
 
     /// Carries out what the operator wished meanwhile; `target` finds the row that would be measured next. True when the run is to
     /// end.
-    pub(super) fn obey(&mut self, target: impl Fn(&Ledger<'_>) -> Option<usize>) -> Result<bool, CollectError> {
+    pub(super) fn obey(
+        &mut self,
+        target: impl Fn(&Ledger<'_>) -> Option<usize>,
+        talker: &mut dyn Talker,
+    ) -> Result<bool, CollectError> {
         while let Some(wish) = self.wishes.pop_front().or_else(|| self.operator.wish()) {
             match wish {
                 Wish::Quit => return Ok(true),
                 Wish::EraseLast => self.erase_last()?,
                 Wish::Skip => self.skip(target(&self.ledger))?,
-                Wish::Pause if self.pause()? => return Ok(true),
+                Wish::Pause if self.pause(talker)? => return Ok(true),
                 Wish::Pause | Wish::Confirm | Wish::Resume => {}
             }
         }
@@ -263,11 +276,11 @@ impl<'a, 'o> Collector<'a, 'o> {
     }
 
     /// Waits for the operator. True when the run is to end.
-    fn pause(&mut self) -> Result<bool, CollectError> {
+    fn pause(&mut self, talker: &mut dyn Talker) -> Result<bool, CollectError> {
         self.operator.tell(&Event::Done(Wish::Pause))?;
         let mut later = Vec::new();
         loop {
-            self.listen()?;
+            self.listen(talker)?;
             match self.wishes.pop_front().or_else(|| self.operator.wish()) {
                 Some(Wish::Resume | Wish::Confirm) => {
                     self.operator.tell(&Event::Done(Wish::Resume))?;
@@ -283,11 +296,11 @@ impl<'a, 'o> Collector<'a, 'o> {
     }
 
     /// Waits until the arm stands still near a joint vector, since the latest move.
-    pub(super) fn rest_at(&mut self, q: &JointVector<f64>) -> Result<Rest, CollectError> {
+    pub(super) fn rest_at(&mut self, q: &JointVector<f64>, talker: &mut dyn Talker) -> Result<Rest, CollectError> {
         let kinds = self.cell.robot.chain.joint_kinds();
         let began = Instant::now();
         while began.elapsed() < self.options.patience {
-            self.listen()?;
+            self.listen(talker)?;
             if self.wants_to_end() {
                 return Ok(Rest::Quit);
             }

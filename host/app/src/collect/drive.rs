@@ -68,7 +68,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
         let Some(mut here) = self.find_place(first)? else { return Ok(Ended::Quit) };
         let mut repeated = None;
         loop {
-            if self.collector.obey(|ledger| ledger.next(here))? {
+            if self.collector.obey(|ledger| ledger.next(here), &mut self.robot)? {
                 return Ok(Ended::Quit);
             }
             let next = self.collector.ledger.next(here);
@@ -116,10 +116,10 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
         let collector = &mut *self.collector;
         let planned = &collector.ledger.rows()[row];
         let joined = joined(planned);
-        if collector.bar != Bar::On(joined) && collector.attach(joined)? {
+        if collector.bar != Bar::On(joined) && collector.attach(joined, &mut self.robot)? {
             return Ok(true);
         }
-        match collector.rest_at(&planned.q)? {
+        match collector.rest_at(&planned.q, &mut self.robot)? {
             Rest::Still(stand) => collector.keep(row, stand)?,
             Rest::Never => collector.miss(row, "the arm did not come to stand still there")?,
             Rest::BarOff => {
@@ -134,7 +134,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
     /// Goes from a row to a neighbouring one, the bar on or off as the plan has it.
     fn step(&mut self, here: usize, next: usize) -> Result<Step, CollectError> {
         let stays_on = self.collector.ledger.stays_on(here, next);
-        if stays_on.is_none() && self.collector.detach()? {
+        if stays_on.is_none() && self.collector.detach(&mut self.robot)? {
             return Ok(Step::Quit);
         }
         let (from_q, q) = (self.collector.ledger.rows()[here].q, self.collector.ledger.rows()[next].q);
@@ -143,7 +143,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
         for attempt in 0..=RETRIES {
             if let Some(joined) = stays_on
                 && self.collector.bar != Bar::On(joined)
-                && self.collector.attach(joined)?
+                && self.collector.attach(joined, &mut self.robot)?
             {
                 return Ok(Step::Quit);
             }
@@ -194,7 +194,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
         if plan::way_between(self.collector.cell, None, &from, &q, SEED).is_none() {
             return Ok(Clear::NoWay);
         }
-        if self.collector.detach()? {
+        if self.collector.detach(&mut self.robot)? {
             return Ok(Clear::Quit);
         }
         self.go_clear(None, &q, target)
@@ -305,7 +305,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
     /// Brings an arm that stands off the plan, its bar off, to a row.
     fn approach(&mut self, target: usize) -> Result<Option<usize>, CollectError> {
         let row = &self.collector.ledger.rows()[target];
-        if self.collector.detach()? {
+        if self.collector.detach(&mut self.robot)? {
             return Ok(None);
         }
         let why = match self.go_clear(None, &row.q, target)? {
@@ -326,7 +326,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
         let Some((row, before)) = self.returnable(here, joined) else { return Ok(false) };
         let (back_q, q) = (self.collector.ledger.rows()[here].q, self.collector.ledger.rows()[row].q);
         match self.go_clear(Some(joined), &q, row)? {
-            Clear::Arrived => match self.collector.rest_at(&q)? {
+            Clear::Arrived => match self.collector.rest_at(&q, &mut self.robot)? {
                 Rest::Still(stand) => self.collector.compare(row, &before, &stand)?,
                 Rest::Quit => return Ok(true),
                 Rest::Never | Rest::BarOff => {}
@@ -338,7 +338,7 @@ impl<'c, 'a, 'o, 'r> Drive<'c, 'a, 'o, 'r> {
                 }
             }
         }
-        if self.collector.bar != Bar::On(joined) && self.collector.attach(joined)? {
+        if self.collector.bar != Bar::On(joined) && self.collector.attach(joined, &mut self.robot)? {
             return Ok(true);
         }
         match self.go_clear(Some(joined), &back_q, here)? {

@@ -7,8 +7,9 @@ use super::Nearness;
 use super::board_watch::Stand;
 use super::collector::{Collector, Ended};
 use super::errors::CollectError;
-use super::ledger::{RowState, joined, shells};
+use super::ledger::{Ledger, RowState, joined, shells};
 use super::operator::Event;
+use super::talker::Nobody;
 
 /// What somebody is told who moves the robot.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +38,7 @@ impl Collector<'_, '_> {
                 Guide::Hand => None,
                 Guide::Programs(programs) => programs.get(number),
             };
-            if self.detach()? {
+            if self.detach(&mut Nobody)? {
                 return Ok(Ended::Quit);
             }
             match programs {
@@ -51,7 +52,7 @@ impl Collector<'_, '_> {
                     self.operator.tell(&Event::Start(&programs.approach))?;
                 }
             }
-            if self.attach(joined(&self.ledger.rows()[first]))? {
+            if self.attach(joined(&self.ledger.rows()[first]), &mut Nobody)? {
                 return Ok(Ended::Quit);
             }
             if let Some(programs) = programs {
@@ -73,10 +74,11 @@ impl Collector<'_, '_> {
                 told = Some(target);
                 self.tell_where(target)?;
             }
-            if self.obey(|ledger| shell.clone().find(|&row| *ledger.state(row) == RowState::Todo))? {
+            let next = |ledger: &Ledger<'_>| shell.clone().find(|&row| *ledger.state(row) == RowState::Todo);
+            if self.obey(next, &mut Nobody)? {
                 return Ok(true);
             }
-            self.listen()?;
+            self.listen(&mut Nobody)?;
             let since_us = self.since_us;
             if let Some(stand) = self.board.take_stand().filter(|stand| stand.began_us >= since_us) {
                 self.take_followed(shell, near, stand)?;
@@ -101,7 +103,7 @@ impl Collector<'_, '_> {
             if self.wants_to_end() {
                 return Ok(true);
             }
-            self.listen()?;
+            self.listen(&mut Nobody)?;
         }
     }
 

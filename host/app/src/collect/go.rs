@@ -98,7 +98,7 @@ impl Drive<'_, '_, '_, '_> {
         let mut polled = Instant::now();
         let mut held = None;
         loop {
-            self.collector.listen()?;
+            self.collector.listen(&mut self.robot)?;
             if self.collector.wants_to_end() {
                 return Ok(Go::Quit);
             }
@@ -145,7 +145,7 @@ impl Drive<'_, '_, '_, '_> {
         let began = Instant::now();
         let mut stood = self.collector.board.ask()?;
         while began.elapsed() < STOPPING {
-            self.collector.listen()?;
+            self.collector.listen(&mut self.robot)?;
             let view = self.collector.board.view()?;
             let moved = stood.q.as_array().iter().zip(view.q.as_array()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             if moved > STANDS_WITHIN {
@@ -197,7 +197,7 @@ impl Drive<'_, '_, '_, '_> {
                 let line = self.collector.ledger.rows()[row].line;
                 return Err(CollectError::Elsewhere { line, joint: joint + 1, sent: at(q), found: at(&view.q) });
             }
-            self.collector.listen()?;
+            self.collector.listen(&mut self.robot)?;
         }
     }
 }

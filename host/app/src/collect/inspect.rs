@@ -4,6 +4,7 @@ use super::collector::Collector;
 use super::drive::Drive;
 use super::errors::CollectError;
 use super::operator::Event;
+use super::talker::Talker;
 use crate::robot_link::Intervention;
 use crate::units::joints_text;
 
@@ -21,7 +22,7 @@ impl Drive<'_, '_, '_, '_> {
     pub(super) fn attend(&mut self) -> Result<bool, CollectError> {
         let mut is_changed = false;
         while let Some(needed) = self.robot.intervention()? {
-            if self.collector.ask_to_look(&needed)? {
+            if self.collector.ask_to_look(&needed, &mut self.robot)? {
                 return Ok(true);
             }
             self.robot.release()?;
@@ -37,7 +38,7 @@ impl Drive<'_, '_, '_, '_> {
 
 impl Collector<'_, '_> {
     /// True when the operator wants to end instead of confirming.
-    fn ask_to_look(&mut self, needed: &Intervention) -> Result<bool, CollectError> {
+    fn ask_to_look(&mut self, needed: &Intervention, talker: &mut dyn Talker) -> Result<bool, CollectError> {
         let place = self.place()?;
         let Intervention { what, remedy } = needed;
         if !self.operator.is_present() {
@@ -45,7 +46,7 @@ impl Collector<'_, '_> {
         }
         self.summary.troubles.push(format!("the robot stood {place}: {what}"));
         self.operator.tell(&Event::Inspect { place: &place, needed })?;
-        if self.wait_for_confirmation()? {
+        if self.wait_for_confirmation(talker)? {
             return Ok(true);
         }
         self.trouble(format!("the operator has confirmed: {what}"))?;

@@ -1,7 +1,7 @@
 //! Walks a plan: moves the robot from row to row, waits until it stands still, and keeps what the bar then measures.
 //!
 //! ```text
-//! plan.csv ─▶ Ledger (what is done, what is next) ─▶ Collector ─ start_move, poll ─▶ RobotLink
+//! plan.csv ─▶ Ledger (what is done, what is next) ─▶ Collector ─ start_move, poll, listen ─▶ RobotLink
 //!                                                     │    ▲
 //!                 Operator (attaches the bar; wishes) ┘    └ BoardWatch ◀─ frames ─ board
 //!                                                               └─▶ Recorder (stream.bbl, poses.csv)
@@ -26,6 +26,7 @@ mod now;
 mod operator;
 mod repeat;
 mod shell_programs;
+mod talker;
 mod track;
 
 pub use board_watch::{BoardWatch, Stand, View};

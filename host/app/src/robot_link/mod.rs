@@ -17,6 +17,7 @@ mod rtde;
 pub mod sim;
 mod speed;
 mod tcp;
+mod ur_course;
 mod ur_script_port;
 pub mod urscript;
 pub mod val;
@@ -149,6 +150,15 @@ pub trait RobotLink {
     /// # Errors
     /// [`LinkError`].
     fn release(&mut self) -> Result<(), LinkError> {
+        Ok(())
+    }
+
+    /// Takes in what the controller says without being asked, so that nothing waits unheard. To be called several times a second, also
+    /// while somebody or something else is waited for. Waits a few milliseconds at most.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    fn listen(&mut self) -> Result<(), LinkError> {
         Ok(())
     }
 

@@ -212,6 +212,11 @@ impl Rtde {
         }
     }
 
+    /// Whether no part of a package is held.
+    pub(super) fn is_between_packages(&self) -> bool {
+        self.heard.is_empty()
+    }
+
     /// Sends a request and gives the payload of its answer.
     fn ask(&mut self, kind: u8, payload: &[u8], wait: Duration) -> Result<Vec<u8>, LinkError> {
         // Every request is far shorter than 65,536 bytes.

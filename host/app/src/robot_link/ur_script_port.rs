@@ -3,7 +3,8 @@
 //! A controller that knows local and remote control (e-Series) takes programs in remote control only. A connection that was made in
 //! local control stays deaf as long as it lasts, also in remote control, and nothing on it says so; one that was made in remote control
 //! is closed when the controller goes to local. Only the dashboard tells which it is. So it is asked before every program, and a
-//! connection that was closed or made in local control is made anew first.
+//! connection that was closed, or made in local control or without asking, is made anew first. What stops the robot is sent without
+//! asking, and not over such a connection either.
 //!
 //! Sources: UniversalRobots/Universal_Robots_ROS_Driver, issue 459, "Headless mode is not working" (what becomes of connections, of the
 //! primary interface; a maintainer on 2026-03-30), and issue 131 (the same of scripts); the reply to `is in remote control`, `true` or `false`, and that it came with software 5.6, as in
@@ -37,8 +38,8 @@ pub(super) struct ScriptPort {
     wait: Duration,
     /// `None` when it was closed.
     tcp: Option<Tcp>,
-    /// Made in local control.
-    is_deaf: bool,
+    /// Made in local control, or without asking: it may be deaf.
+    is_doubtful: bool,
     /// The dashboard did not tell; it is not asked again before a program was not begun.
     is_untold: bool,
 }
@@ -50,7 +51,7 @@ impl ScriptPort {
     /// [`LinkError`].
     pub(super) fn connect(host: &str, port: u16, dashboard_port: u16, wait: Duration) -> Result<Self, LinkError> {
         let tcp = Some(Tcp::connect(host, port, wait, &StopFlag::default())?);
-        Ok(Self { host: host.to_owned(), port, dashboard_port, wait, tcp, is_deaf: false, is_untold: false })
+        Ok(Self { host: host.to_owned(), port, dashboard_port, wait, tcp, is_doubtful: false, is_untold: false })
     }
 
     /// Reads away what the controller sends, and notices when it has closed the connection.
@@ -77,7 +78,7 @@ impl ScriptPort {
             _ => Control::Unknown,
         };
         self.is_untold = control == Control::Unknown;
-        self.is_deaf |= control == Control::Local;
+        self.is_doubtful |= control == Control::Local;
         Ok(control)
     }
 
@@ -88,26 +89,33 @@ impl ScriptPort {
     pub(super) fn send(&mut self, program: &str, stop: &StopFlag) -> Result<Control, LinkError> {
         let control = self.control(stop)?;
         if control != Control::Local {
-            if self.is_deaf {
-                self.forget();
-            }
+            self.drop_doubtful();
             self.write(program, self.wait, stop)?;
         }
         Ok(control)
     }
 
-    /// Sends what stops the robot, whatever the user wants and whether or not the connection is of use: a controller in local control
-    /// runs no program of this link.
+    /// Sends what stops the robot, whatever the user wants and whether or not the controller takes it: in local control it runs no program
+    /// of this link. Nothing is asked first, so a connection that is made for it is doubtful itself.
     ///
     /// # Errors
     /// [`LinkError`].
     pub(super) fn send_regardless(&mut self, program: &str) -> Result<(), LinkError> {
+        self.discard();
+        self.drop_doubtful();
+        self.is_doubtful = self.tcp.is_none();
         self.write(program, STOP_WAIT, &StopFlag::default())
     }
 
     /// The connection is made anew for the next program: over this one none was begun.
     pub(super) fn forget(&mut self) {
-        (self.tcp, self.is_deaf, self.is_untold) = (None, false, false);
+        (self.tcp, self.is_doubtful, self.is_untold) = (None, false, false);
+    }
+
+    fn drop_doubtful(&mut self) {
+        if std::mem::take(&mut self.is_doubtful) {
+            self.tcp = None;
+        }
     }
 
     fn write(&mut self, program: &str, wait: Duration, stop: &StopFlag) -> Result<(), LinkError> {

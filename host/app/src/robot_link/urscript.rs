@@ -21,6 +21,7 @@ use ballbar::JointVector;
 
 use super::dashboard::Dashboard;
 use super::rtde::{Heard, JOINTS, RobotState, Rtde};
+use super::ur_course::{Course, largest, with_words};
 use super::ur_script_port::{Control, ScriptPort};
 use super::{Intervention, JointSpeed, LinkError, MoveState, Patience, RobotLink};
 use crate::deadline::{Deadline, StopFlag, WaitOver};
@@ -29,13 +30,11 @@ use crate::deadline::{Deadline, StopFlag, WaitOver};
 pub(super) const ACCELERATION_RAD_S2: f64 = 1.4;
 /// Deceleration of stops, radians per second squared: 60 degrees per second end within a quarter of a second.
 const STOP_RAD_S2: f64 = 4.0;
-/// The robot is where it was sent when no joint is off by more: far more than a UR's servos leave, far less than any planned step.
-const TOLERANCE_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
-/// A joint slower than this stands, radians per second.
-const STANDING_RAD_S: f64 = 0.01;
 const LOCAL_CONTROL: &str = "the controller is in local control, and takes no programs";
-/// Messages that one poll takes: seconds' worth.
-const MESSAGES_A_POLL: usize = 512;
+/// So long at most is listened in one go, however much has gathered.
+const LISTEN_WAIT: Duration = Duration::from_millis(100);
+/// What was heard so lately is of now. A package comes in every eight milliseconds.
+const NOW: Duration = Duration::from_millis(250);
 
 /// Where the controller's interfaces are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,35 +61,17 @@ pub struct UrLink {
     script: ScriptPort,
     rtde: Rtde,
     latest: RobotState,
-    heard_at: Instant,
+    /// The latest state came no earlier. When it did come is not known where it was read later.
+    heard_since: Instant,
+    /// When nothing was left to be read.
+    caught_up: Instant,
     /// What the controller told people since the move was sent, and the dashboard at the latest release.
     words: Vec<String>,
-    /// Whether the latest intervention told of a protective stop: no other one is released.
+    /// Whether the protective stop that the latest intervention told of is there without a break: no other one is released.
     has_told_stop: bool,
     course: Option<Course>,
     moves: u64,
     stop: StopFlag,
-}
-
-/// The latest move.
-struct Course {
-    goal_rad: [f64; JOINTS],
-    sent: Instant,
-    /// How long the move may take at the speed that it was sent with.
-    allowed: Duration,
-    /// How much of that has passed until `counted`: time while the robot is slowed down counts in proportion.
-    spent: Duration,
-    counted: Instant,
-    /// Whether it was seen running.
-    has_begun: bool,
-    /// Since when the robot stands, without a program, elsewhere than at the goal.
-    stands_since: Option<Instant>,
-    /// Since when the robot stands because something holds the program, and what.
-    held: Option<(Instant, &'static str)>,
-    is_stopped_by_us: bool,
-    /// The controller did not take the program.
-    is_unheard: bool,
-    state: MoveState,
 }
 
 impl UrLink {
@@ -99,6 +80,7 @@ impl UrLink {
     /// # Errors
     /// [`LinkError`].
     pub fn connect(host: &str, ports: UrPorts, patience: Patience) -> Result<Self, LinkError> {
+        let began = Instant::now();
         let mut script = ScriptPort::connect(host, ports.script, ports.dashboard, patience.answer)?;
         let mut rtde = Rtde::connect(host, ports.rtde, patience.answer)?;
         let latest = first_state(&mut rtde, patience.answer)?.ok_or_else(|| LinkError::Unexpected {
@@ -115,7 +97,8 @@ impl UrLink {
             script,
             rtde,
             latest,
-            heard_at: Instant::now(),
+            heard_since: began,
+            caught_up: began,
             words: Vec::new(),
             has_told_stop: false,
             course: None,
@@ -124,39 +107,49 @@ impl UrLink {
         })
     }
 
-    /// Takes in all that the controller has said.
-    fn listen(&mut self) -> Result<(), LinkError> {
-        self.script.discard();
-        for _ in 0..MESSAGES_A_POLL {
-            match self.rtde.next()? {
-                None => break,
-                Some(Heard::Text(text)) if self.words.len() < 8 => self.words.push(text),
-                Some(Heard::Text(_)) => {}
-                Some(Heard::State(state)) => {
-                    self.latest = state;
-                    self.heard_at = Instant::now();
-                    if let Some(course) = &mut self.course {
-                        course.follow(&state, &self.patience, &self.words);
-                    }
-                }
+    /// Listens until the latest that is known of the robot is of now, as long as an answer may take.
+    fn hear_now(&mut self) -> Result<(), LinkError> {
+        let deadline = Deadline::after(self.patience.answer, &self.stop);
+        loop {
+            self.listen()?;
+            if self.heard_since.elapsed() < NOW {
+                return Ok(());
+            }
+            match deadline.check() {
+                Ok(()) => {}
+                Err(WaitOver::Late) => return Ok(()),
+                Err(WaitOver::Stopped) => return Err(LinkError::Stopped),
             }
         }
-        Ok(())
+    }
+
+    /// Whether nothing was heard for longer than an answer may take, or what was heard may be older.
+    fn is_out_of_date(&self) -> bool {
+        self.heard_since.elapsed() > self.patience.answer
+    }
+
+    /// Whether the protective stop that the latest intervention told of is known to be there still.
+    fn is_told_stop_there(&self) -> bool {
+        self.has_told_stop && !self.is_out_of_date()
     }
 
     /// Why no move can begin now.
     fn obstacle(&self) -> Option<String> {
-        if self.heard_at.elapsed() > self.patience.answer {
-            return Some(format!("nothing heard of the robot for {:.1} s", self.heard_at.elapsed().as_secs_f64()));
+        if self.is_out_of_date() {
+            return Some(format!("nothing heard of the robot for {:.1} s", self.heard_since.elapsed().as_secs_f64()));
         }
         self.latest.obstacle().map(|obstacle| with_words(obstacle, &self.words))
     }
 
-    /// Asks the dashboard to release a protective stop, as often as time allows.
+    /// Asks the dashboard to release the protective stop that was told, as often as time allows.
     fn unlock(&mut self, deadline: &Deadline) -> Result<(), LinkError> {
         let mut dashboard = Dashboard::connect(&self.host, self.ports.dashboard, self.patience.answer, &self.stop)?;
         dashboard.ask("close safety popup")?;
-        while self.latest.is_in_protective_stop() {
+        loop {
+            self.hear_now()?;
+            if !self.is_told_stop_there() {
+                return Ok(());
+            }
             let reply = dashboard.ask("unlock protective stop")?;
             if reply.starts_with("Protective stop releasing") {
                 return Ok(());
@@ -170,9 +163,7 @@ impl UrLink {
                 Err(WaitOver::Stopped) => return Err(LinkError::Stopped),
             }
             std::thread::sleep(Duration::from_millis(200));
-            self.listen()?;
         }
-        Ok(())
     }
 }
 
@@ -181,33 +172,20 @@ impl RobotLink for UrLink {
         format!("urscript at {}", self.host)
     }
 
-    /// Asks the dashboard first whether the controller takes programs, which takes some milliseconds; of one that does not answer,
-    /// [`Patience::answer`], once.
+    /// Hears first where the robot is now, and asks the dashboard whether the controller takes programs, which takes some milliseconds.
+    /// A controller that says nothing is waited for as long as [`Patience::answer`], and so is, once, a dashboard that does not answer.
     fn start_move(&mut self, q: &JointVector<f64>, speed: &JointSpeed) -> Result<(), LinkError> {
-        self.listen()?;
+        self.hear_now()?;
         let mut goal_rad = [0.0; JOINTS];
         goal_rad.copy_from_slice(&q.as_array()[..JOINTS]);
         let v_rad_s = speed.revolute_rad_s;
         let way_rad = largest(&goal_rad, &self.latest.q_rad);
-        let now = Instant::now();
-        let mut course = Course {
-            goal_rad,
-            sent: now,
-            spent: Duration::ZERO,
-            counted: now,
-            allowed: self.patience.allowed(way_rad / v_rad_s + v_rad_s / ACCELERATION_RAD_S2),
-            has_begun: false,
-            stands_since: None,
-            held: None,
-            is_stopped_by_us: false,
-            is_unheard: false,
-            state: MoveState::Moving,
-        };
+        let mut course = Course::new(goal_rad, self.patience.allowed(way_rad / v_rad_s + v_rad_s / ACCELERATION_RAD_S2));
         let is_sound = goal_rad.iter().all(|q| q.is_finite()) && v_rad_s.is_finite() && v_rad_s > 0.0;
         let obstacle = if is_sound { self.obstacle() } else { Some("a move to or at what is no number".into()) };
         self.words.clear();
         if let Some(obstacle) = obstacle {
-            course.state = MoveState::Refused(obstacle);
+            course.refuse(obstacle);
         } else {
             self.moves += 1;
             let joints = goal_rad.map(|q| format!("{q:.8}")).join(", ");
@@ -215,10 +193,10 @@ impl RobotLink for UrLink {
             let program =
                 format!("def ballbar_{number}():\n  movej([{joints}], a={ACCELERATION_RAD_S2:.3}, v={v_rad_s:.6})\nend\n");
             if self.script.send(&program, &self.stop)? == Control::Local {
-                course.state = MoveState::Refused(LOCAL_CONTROL.into());
+                course.refuse(LOCAL_CONTROL.into());
             }
             // The dashboard may have taken its time to answer.
-            (course.sent, course.counted) = (Instant::now(), Instant::now());
+            course.restart();
         }
         self.course = Some(course);
         Ok(())
@@ -229,42 +207,42 @@ impl RobotLink for UrLink {
         self.listen()?;
         let Some(course) = &mut self.course else { return Ok(MoveState::Reached) };
         course.lapse();
-        if course.is_unheard {
+        if course.is_unheard() {
             self.script.forget();
         }
         Ok(course.told(&self.patience))
     }
 
     fn joints(&mut self) -> Result<Option<JointVector<f64>>, LinkError> {
-        self.listen()?;
+        self.hear_now()?;
         let mut q = JointVector::zero();
         q.as_array_mut()[..JOINTS].copy_from_slice(&self.latest.q_rad);
-        Ok((self.heard_at.elapsed() < self.patience.answer).then_some(q))
+        Ok((!self.is_out_of_date()).then_some(q))
     }
 
     fn stop(&mut self) -> Result<(), LinkError> {
         if let Some(course) = &mut self.course {
-            course.is_stopped_by_us = true;
+            course.note_stop();
         }
         self.script.send_regardless(&format!("stopj({STOP_RAD_S2:.1})\n"))
     }
 
     /// Ends what runs. What the controller's safety has stopped stays as it is.
     fn recover(&mut self) -> Result<(), LinkError> {
-        self.listen()?;
+        self.hear_now()?;
         if self.latest.obstacle().is_none() { self.stop() } else { Ok(()) }
     }
 
     fn intervention(&mut self) -> Result<Option<Intervention>, LinkError> {
-        self.listen()?;
+        self.hear_now()?;
         self.has_told_stop = self.latest.is_in_protective_stop();
-        if let Some(obstacle) = self.latest.obstacle() {
-            let remedy = if self.has_told_stop {
+        if let Some(obstacle) = self.obstacle() {
+            let remedy = if self.is_told_stop_there() {
                 "Look at the robot, and remove what made it stop: it is released when you confirm"
             } else {
                 "See to it at the controller, until the robot is ready to move"
             };
-            return Ok(Some(Intervention { what: with_words(obstacle, &self.words), remedy }));
+            return Ok(Some(Intervention { what: obstacle, remedy }));
         }
         let is_local = self.script.control(&self.stop)? == Control::Local;
         let remedy = "Switch it to remote control, at the top right of the teach pendant";
@@ -276,8 +254,8 @@ impl RobotLink for UrLink {
     /// five seconds. Where the dashboard does not answer, nothing is released.
     fn release(&mut self) -> Result<(), LinkError> {
         let deadline = Deadline::after(self.patience.recover, &self.stop);
-        self.listen()?;
-        if !std::mem::take(&mut self.has_told_stop) || !self.latest.is_in_protective_stop() {
+        self.hear_now()?;
+        if !self.is_told_stop_there() {
             return Ok(());
         }
         self.words.clear();
@@ -286,87 +264,48 @@ impl RobotLink for UrLink {
             Err(LinkError::Stopped) => return Err(LinkError::Stopped),
             Err(error) => self.words.push(error.to_string()),
         }
-        while self.latest.is_in_protective_stop() {
+        while self.has_told_stop {
             match deadline.check() {
                 Ok(()) => self.listen()?,
                 Err(WaitOver::Late) => break,
                 Err(WaitOver::Stopped) => return Err(LinkError::Stopped),
             }
         }
+        // The next one to be released is one that is told of first.
+        self.has_told_stop = false;
         if self.latest.obstacle().is_none() { self.stop() } else { Ok(()) }
+    }
+
+    /// Takes in all that the controller has said.
+    fn listen(&mut self) -> Result<(), LinkError> {
+        self.script.discard();
+        let deadline = Deadline::regardless(LISTEN_WAIT);
+        while deadline.check().is_ok() {
+            match self.rtde.next()? {
+                None => {
+                    if self.rtde.is_between_packages() {
+                        self.caught_up = Instant::now();
+                    }
+                    break;
+                }
+                Some(Heard::Text(text)) if self.words.len() < 8 => self.words.push(text),
+                Some(Heard::Text(_)) => {}
+                Some(Heard::State(state)) => {
+                    self.latest = state;
+                    // It was not there yet when nothing was left, and may have come soon after.
+                    self.heard_since = self.caught_up;
+                    self.has_told_stop &= state.is_in_protective_stop();
+                    if let Some(course) = &mut self.course {
+                        course.follow(&state, &self.patience, &self.words);
+                    }
+                }
+            }
+        }
+        Ok(())
     }
 
     fn heed(&mut self, stop: &StopFlag) {
         self.stop = stop.clone();
-    }
-}
-
-impl Course {
-    /// Draws the conclusions of one data package.
-    fn follow(&mut self, robot: &RobotState, patience: &Patience, words: &[String]) {
-        if self.state != MoveState::Moving {
-            return;
-        }
-        self.count(robot.pace());
-        let is_standing = robot.qd_rad_s.iter().all(|qd| qd.abs() < STANDING_RAD_S);
-        self.held =
-            robot.hold().filter(|_| is_standing).map(|what| (self.held.map_or_else(Instant::now, |(since, _)| since), what));
-        self.has_begun |= robot.is_playing() || !is_standing;
-        if let Some(obstacle) = robot.obstacle() {
-            self.state = self.ended(with_words(obstacle, words));
-            return;
-        }
-        let is_idle = is_standing && robot.is_stopped();
-        let is_there = [&robot.q_rad, &robot.target_q_rad].iter().all(|q| largest(&self.goal_rad, q) < TOLERANCE_RAD);
-        if is_idle && is_there {
-            // A robot that was there already need not be seen moving.
-            if self.has_begun || self.sent.elapsed() > patience.stand {
-                self.state = MoveState::Reached;
-            }
-            return;
-        }
-        if !is_idle {
-            self.stands_since = None;
-            return;
-        }
-        let stands_for = self.stands_since.get_or_insert_with(Instant::now).elapsed();
-        if self.has_begun && stands_for > patience.stand {
-            let what = if self.is_stopped_by_us { "stopped as asked" } else { "the program ended before the robot was there" };
-            self.state = self.ended(with_words(what.into(), words));
-        } else if !self.has_begun && self.sent.elapsed() > patience.begin {
-            let what = "the controller did not begin the move; is it in remote control?";
-            self.state = self.ended(with_words(what.into(), words));
-            self.is_unheard = true;
-        }
-    }
-
-    /// Refused or Fault, as the move has begun or not.
-    fn ended(&self, words: String) -> MoveState {
-        if self.has_begun { MoveState::Fault(words) } else { MoveState::Refused(words) }
-    }
-
-    /// Counts the time since it was counted last, in which the robot went at this fraction of the speed asked for.
-    fn count(&mut self, pace: f64) {
-        let now = Instant::now();
-        self.spent += now.saturating_duration_since(self.counted).mul_f64(pace);
-        self.counted = now;
-    }
-
-    /// Ends a move that takes too long. Time in which nothing is heard counts in full.
-    fn lapse(&mut self) {
-        if self.state == MoveState::Moving && self.spent + self.counted.elapsed() > self.allowed {
-            self.state = MoveState::TimedOut(self.sent.elapsed());
-        }
-    }
-
-    /// How the move stands, for others.
-    fn told(&self, patience: &Patience) -> MoveState {
-        match self.held {
-            Some((since, what)) if self.state == MoveState::Moving && since.elapsed() > patience.stand => {
-                MoveState::Held(what.to_owned())
-            }
-            _ => self.state.clone(),
-        }
     }
 }
 
@@ -378,13 +317,4 @@ fn first_state(rtde: &mut Rtde, wait: Duration) -> Result<Option<RobotState>, Li
         }
     }
     Ok(None)
-}
-
-/// The largest difference of a joint, radians.
-fn largest(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
-fn with_words(what: String, words: &[String]) -> String {
-    if words.is_empty() { what } else { format!("{what} ({})", words.join("; ")) }
 }

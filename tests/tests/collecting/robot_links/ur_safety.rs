@@ -144,6 +144,55 @@ fn a_connection_that_local_control_closed_is_made_anew() {
     assert_eq!(go(&mut link, &GOAL_RAD).unwrap(), MoveState::Reached);
 }
 
+/// Waits until a controller has taken what was sent.
+fn wait_for_program(peer: &UrPeer, program: &str) {
+    let deadline = Instant::now() + Duration::from_secs(2);
+    while peer.programs().last().is_none_or(|last| last != program) {
+        assert!(Instant::now() < deadline, "`{program}` does not come: {:?}", peer.programs());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn what_stops_the_robot_is_not_lost_over_a_connection_of_local_control() {
+    // Whether or not the dashboard was asked while the controller was in local control.
+    for is_asked in [false, true] {
+        let peer = UrPeer::start(UrPeerOptions { pace: 1.0, ..UrPeerOptions::default() });
+        let mut link = connect(&peer);
+        link.start_move(&joint_vector(&GOAL_RAD), &SPEED).unwrap();
+        let until = Instant::now() + Duration::from_millis(200);
+        while Instant::now() < until {
+            assert_eq!(link.poll().unwrap(), MoveState::Moving);
+        }
+        peer.set_paused(true);
+        peer.set_remote(false);
+        std::thread::sleep(Duration::from_millis(50));
+        link.poll().unwrap();
+        // The connection is closed; the one that is made for this is deaf.
+        link.stop().unwrap();
+        std::thread::sleep(Duration::from_millis(50));
+        assert_eq!(peer.programs().len(), 1);
+        if is_asked {
+            assert!(link.intervention().unwrap().unwrap().what.contains("local control"));
+        }
+        peer.set_remote(true);
+        link.recover().unwrap();
+        wait_for_program(&peer, "stopj(4.0)\n");
+        let paused_rad = peer.joints().joints_at(Instant::now());
+        peer.set_paused(false);
+        std::thread::sleep(Duration::from_millis(100));
+        assert_eq!(peer.joints().joints_at(Instant::now()), paused_rad, "the program that was paused does not go on");
+        assert_eq!(go(&mut link, &paused_rad).unwrap(), MoveState::Reached);
+    }
+    // Connected in local control.
+    let peer = UrPeer::start(UrPeerOptions::default());
+    peer.set_remote(false);
+    let mut link = connect(&peer);
+    peer.set_remote(true);
+    link.stop().unwrap();
+    wait_for_program(&peer, "stopj(4.0)\n");
+}
+
 #[test]
 fn a_controller_that_knows_no_remote_control_is_moved_all_the_same() {
     let peer = UrPeer::start(UrPeerOptions { tells_control: false, ..UrPeerOptions::default() });
