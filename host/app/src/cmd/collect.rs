@@ -137,7 +137,7 @@ impl CollectArgs {
         let guide = match programs {
             None => Guide::Hand,
             Some(programs) => {
-                programs.write(&self.session).map_err(CommandError::output)?;
+                programs.write(&lock).map_err(CommandError::output)?;
                 Guide::Programs(programs.names)
             }
         };
