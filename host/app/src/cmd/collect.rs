@@ -16,8 +16,8 @@ use thiserror::Error;
 use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::port::{PortArgs, StillnessArgs};
+use super::recorder::begin_recording;
 use super::report::print;
-use super::stream::say_recovered;
 use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
     BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, Programs, TrackOptions,
@@ -242,11 +242,7 @@ impl CollectArgs {
             temperature_c: self.temperature_c,
             ..Run::beginning(link.port_name(), link.hello(), self.rate)
         };
-        let mut recorder = Recorder::begin(lock, run, Some(robot.kinds())).map_err(record_error)?;
-        say_recovered(&recorder);
-        recorder.frame(link.hello_frame()).map_err(record_error)?;
-        recorder.frame(frame).map_err(record_error)?;
-        Ok(recorder)
+        begin_recording(lock, run, Some(robot.kinds()), &[link.hello_frame(), frame])
     }
 }
 
