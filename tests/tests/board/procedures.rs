@@ -10,6 +10,7 @@ use host_cal::board::{
     Admission, BAUD, BoardLink, HomeError, Homing, LvdtError, LvdtOrigin, LvdtPoint, RobotOnBoard, Upload, UploadError,
     UploadStep, fit_lvdt, store_lvdt,
 };
+use host_cal::collect::{CheckedBoard, CollectError};
 use host_cal::files::open_robot;
 use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions};
 
@@ -104,4 +105,19 @@ fn a_curve_is_stored_only_within_its_tolerance() {
     assert_eq!(curve(&mut link), before);
     store_lvdt(&mut link, &fit, 0.9e-3).unwrap();
     assert_eq!(curve(&mut link), *fit.curve());
+}
+
+#[test]
+fn a_collection_begins_only_with_a_homed_board_that_has_the_plans_robot() {
+    let (_board, link) = empty_board();
+    let [puma, scara] = ["puma560", "scara"].map(|name| open_robot(name).unwrap());
+    assert!(matches!(CheckedBoard::read(link, &puma), Err(CollectError::NoParameters)));
+
+    let (board, link) = board_with_the_design();
+    assert!(matches!(CheckedBoard::read(link, &puma), Err(CollectError::NotHomed)));
+    let again = || BoardLink::connect(board.port(), BAUD).unwrap();
+    Homing::begin(&mut again()).unwrap().at(&[0.0; 6], None).unwrap();
+    assert!(matches!(CheckedBoard::read(again(), &scara), Err(CollectError::OtherRobot { .. })));
+    let checked = CheckedBoard::read(again(), &puma).unwrap();
+    assert_eq!(checked.robot().kinds(), puma.chain.joint_kinds());
 }
