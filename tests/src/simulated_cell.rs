@@ -7,9 +7,10 @@ use std::time::Duration;
 use ballbar::StillnessCriteria;
 use ballbar_calib::model::{PairingId, Rig, Robot};
 use ballbar_calib::plan::{Cell, CheckedPlan, Grid, Margins, Pace as PlanPace, PlanOptions, PlanRow, plan};
-use host_cal::board::{BAUD, BoardLink, RobotOnBoard, parameter_set};
+use host_cal::board::{BAUD, BoardLink, parameter_set};
 use host_cal::collect::{
-    BoardWatch, CollectError, CollectOptions, Collector, Ended, Guide, Ledger, Nearness, Operator, RowState, Summary,
+    BoardWatch, CheckedBoard, CollectError, CollectOptions, Collector, Ended, Guide, Ledger, Nearness, Operator, RowState,
+    Summary,
 };
 use host_cal::files::{Source, open_rig, open_robot, read_plan, write_plan};
 use host_cal::robot_link::RobotLink;
@@ -196,15 +197,15 @@ impl<Board> SimulatedCell<Board> {
         let (design, rig) = (design(), rig());
         let rows = self.rows();
         let cell = Cell::new(&design, &rig, TRAVEL_M, Margins::default(), PlanPace::default()).expect("the rig is sound");
-        let mut board = BoardLink::connect(port, BAUD).expect("the board answers");
-        let (robot, _) = RobotOnBoard::read(&mut board).expect("the board answers").expect("it holds parameters");
-        let run = Run::beginning("port", board.hello(), 200);
+        let board = BoardLink::connect(port, BAUD).expect("the board answers");
+        let board = CheckedBoard::read(board, &design).expect("it is homed, with the plan's robot");
+        let run = Run::beginning("port", board.link().hello(), 200);
         let lock = SessionLock::acquire(&self.path(session)).expect("nobody else writes");
-        let recorder = Recorder::begin(&lock, run, Some(robot.kinds())).expect("the session can be written");
+        let recorder = Recorder::begin(&lock, run, Some(board.robot().kinds())).expect("the session can be written");
         let plan = CheckedPlan::new(&cell, &rows).expect("a plan that leads into nothing");
         let ledger = Ledger::new(plan, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
         let criteria = StillnessCriteria { hold_us: 200_000, ..StillnessCriteria::default() };
-        let board = BoardWatch::begin(board, robot, recorder, 200, criteria).expect("the board streams");
+        let board = BoardWatch::begin(board, recorder, 200, criteria).expect("the board streams");
         let mut collector = Collector::new(ledger, board, operator, options);
         let near = Nearness { turn_rad: 2_f64.to_radians(), slide_m: 2e-3 };
         let ended = match link {

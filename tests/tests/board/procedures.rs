@@ -7,9 +7,10 @@ use ballbar::LvdtCurve;
 use ballbar::wire::{Answer, Command};
 use ballbar_tests::scenarios;
 use host_cal::board::{
-    Admission, BAUD, BoardLink, HomeError, Homing, LvdtError, LvdtFit, LvdtOrigin, RobotOnBoard, Upload, UploadError, UploadStep,
-    nominal_lvdt, store_lvdt,
+    Admission, BAUD, BoardLink, HomeError, Homing, LvdtError, LvdtOrigin, LvdtPoint, RobotOnBoard, Upload, UploadError,
+    UploadStep, fit_lvdt, store_lvdt,
 };
+use host_cal::collect::{CheckedBoard, CollectError};
 use host_cal::files::open_robot;
 use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions};
 
@@ -84,13 +85,39 @@ fn homing_refuses_what_cannot_be_the_boards_robot_and_presets_nothing() {
 #[test]
 fn a_curve_is_stored_only_within_its_tolerance() {
     let (_board, mut link) = board_with_the_design();
-    let (before, measured) = (curve(&mut link), nominal_lvdt(0.05));
-    let fit = LvdtFit { curve: measured, residuals_m: vec![0.1e-3, -0.6e-3] };
-    for tolerance_m in [0.5e-3, f64::NAN] {
+    let before = curve(&mut link);
+    // The middle one of seven lengths is a millimetre off, of which a line takes up a seventh.
+    let point = |i: i32| {
+        let code = 32_000.0 + 9_000.0 * f64::from(i);
+        LvdtPoint { displacement_m: 0.01 * f64::from(i) + if i == 0 { 1e-3 } else { 0.0 }, code }
+    };
+    let measured: Vec<LvdtPoint> = (-3..=3).map(point).collect();
+    let fit = fit_lvdt(&measured, 1).unwrap();
+    assert!((fit.largest_m() - 6e-3 / 7.0).abs() < 1e-8, "{}", fit.largest_m());
+    for tolerance_m in [0.8e-3, f64::NAN] {
         let refused = store_lvdt(&mut link, &fit, tolerance_m).unwrap_err();
         assert!(matches!(refused, LvdtError::TooFarOff { .. }), "{refused}");
     }
+    // A code that no curve reaches leaves a length of which nothing is known.
+    let beyond: Vec<LvdtPoint> = measured.iter().map(|point| LvdtPoint { code: point.code + 12_000.0, ..*point }).collect();
+    let refused = store_lvdt(&mut link, &fit_lvdt(&beyond, 1).unwrap(), f64::INFINITY).unwrap_err();
+    assert!(matches!(refused, LvdtError::TooFarOff { largest_m: f64::INFINITY, .. }), "{refused}");
     assert_eq!(curve(&mut link), before);
-    store_lvdt(&mut link, &fit, 0.7e-3).unwrap();
-    assert_eq!(curve(&mut link), measured);
+    store_lvdt(&mut link, &fit, 0.9e-3).unwrap();
+    assert_eq!(curve(&mut link), *fit.curve());
+}
+
+#[test]
+fn a_collection_begins_only_with_a_homed_board_that_has_the_plans_robot() {
+    let (_board, link) = empty_board();
+    let [puma, scara] = ["puma560", "scara"].map(|name| open_robot(name).unwrap());
+    assert!(matches!(CheckedBoard::read(link, &puma), Err(CollectError::NoParameters)));
+
+    let (board, link) = board_with_the_design();
+    assert!(matches!(CheckedBoard::read(link, &puma), Err(CollectError::NotHomed)));
+    let again = || BoardLink::connect(board.port(), BAUD).unwrap();
+    Homing::begin(&mut again()).unwrap().at(&[0.0; 6], None).unwrap();
+    assert!(matches!(CheckedBoard::read(again(), &scara), Err(CollectError::OtherRobot { .. })));
+    let checked = CheckedBoard::read(again(), &puma).unwrap();
+    assert_eq!(checked.robot().kinds(), puma.chain.joint_kinds());
 }

@@ -1,5 +1,6 @@
 //! Sessions, plans and robots that move: recording and collecting.
 
+mod accounts;
 mod collecting;
 mod collecting_a_calibration;
 mod collecting_by_controllers;

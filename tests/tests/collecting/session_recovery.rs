@@ -19,7 +19,7 @@ use host_cal::session::{Connection, MeasuredPose, Recorder, Run, SessionLock, Se
 use tempfile::TempDir;
 
 const KINDS: [JointKind; 6] = [JointKind::Revolute; 6];
-const ALL_HOMED: u8 = 0x3F;
+pub(super) const ALL_HOMED: u8 = 0x3F;
 
 /// A recording in which every step's outcome is kept.
 struct Recording {
@@ -44,7 +44,7 @@ struct State {
     poses: Option<String>,
 }
 
-fn connection() -> Connection {
+pub(super) fn connection() -> Connection {
     Connection { chuck: "A".into(), sphere: "1".into(), bar_m: 0.46 }
 }
 
@@ -52,11 +52,11 @@ fn index_at(t_us: u64) -> u32 {
     (t_us / 1_000) as u32
 }
 
-fn frame(message: &ToHost) -> Vec<u8> {
+pub(super) fn frame(message: &ToHost) -> Vec<u8> {
     encode(message, &mut [0; MAX_FRAME]).expect("it fits").to_vec()
 }
 
-fn hello() -> BoardHello {
+pub(super) fn hello() -> BoardHello {
     BoardHello {
         version: PROTOCOL,
         firmware: "0.9.1".try_into().expect("short"),
@@ -253,7 +253,7 @@ impl Recording {
     }
 }
 
-fn begin(session: &Path) -> Recorder {
+pub(super) fn begin(session: &Path) -> Recorder {
     let lock = SessionLock::acquire(session).unwrap();
     Recorder::begin(&lock, Run::beginning("port", &hello(), 1_000), Some(&KINDS)).unwrap()
 }

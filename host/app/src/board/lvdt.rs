@@ -171,7 +171,7 @@ pub fn store_lvdt(link: &mut BoardLink, fit: &LvdtFit, tolerance_m: f64) -> Resu
         return Err(LvdtError::TooFarOff { largest_m: fit.largest_m(), tolerance_m });
     }
     link.act(Command::Discard)?;
-    let Answer::Staged { crc } = link.request(Command::SetLvdt(fit.curve))? else {
+    let Answer::Staged { crc } = link.request(Command::SetLvdt(*fit.curve()))? else {
         return Err(BoardError::WrongAnswer { command: "set LVDT" }.into());
     };
     let began = Instant::now();

@@ -5,6 +5,8 @@ use miette::Diagnostic;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
+use super::verify::larger;
+
 /// A length that was set, as a displacement from mid travel, and the code that was read there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LvdtPoint {
@@ -48,30 +50,38 @@ const LEAST_SPREAD: f64 = 256.0;
 /// The curve may be used a little beyond the codes that it was measured at, as a part of their spread.
 const MARGIN: f64 = 0.01;
 
-/// A curve, and how well it fits.
+/// A curve, and how well it fits: only [`fit_lvdt`] makes one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LvdtFit {
-    /// The curve, rounded to the board's f32.
-    pub curve: LvdtCurve,
-    /// Known displacements less those of this curve, metres.
-    pub residuals_m: Vec<f64>,
+    curve: LvdtCurve,
+    residuals_m: Vec<f64>,
 }
 
 impl LvdtFit {
+    /// The curve, rounded to the board's f32.
+    pub fn curve(&self) -> &LvdtCurve {
+        &self.curve
+    }
+
+    /// Known displacements less those of this curve, metres; not a number where a code lies beyond the curve.
+    pub fn residuals_m(&self) -> &[f64] {
+        &self.residuals_m
+    }
+
     /// RMS residual, metres.
     pub fn rms_m(&self) -> f64 {
         let squares: f64 = self.residuals_m.iter().map(|m| m * m).sum();
         (squares / self.residuals_m.len() as f64).sqrt()
     }
 
-    /// Largest residual, without its sign, metres.
+    /// Largest residual, without its sign, metres; infinite where one is not a number.
     pub fn largest_m(&self) -> f64 {
-        self.residuals_m.iter().fold(0.0, |max, m| max.max(m.abs()))
+        self.residuals_m.iter().fold(0.0, |max, m| larger(max, m.abs()))
     }
 
-    /// Whether no residual is larger.
+    /// Whether every residual is a number and none is larger.
     pub fn is_within(&self, tolerance_m: f64) -> bool {
-        self.largest_m() <= tolerance_m
+        self.residuals_m.iter().all(|m| m.abs() <= tolerance_m)
     }
 }
 
@@ -152,6 +162,16 @@ mod tests {
         measured[3].displacement_m += 0.001;
         let residuals = fit_lvdt(&measured, 1).unwrap().residuals_m;
         assert!(residuals[3] > 0.0008 && residuals.iter().enumerate().all(|(i, r)| i == 3 || r.abs() < 0.0002));
+    }
+
+    #[test]
+    fn a_length_whose_code_the_curve_does_not_reach_is_within_no_tolerance() {
+        let mut measured = points(|u| 0.04 * u, 7);
+        measured[6].code = 70_000.0;
+        let fit = fit_lvdt(&measured, 1).unwrap();
+        assert!(fit.residuals_m[6].is_nan());
+        assert_eq!(fit.largest_m(), f64::INFINITY);
+        assert!(!fit.is_within(1.0) && !fit.is_within(f64::INFINITY));
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use std::num::NonZeroUsize;
 
-use ballbar::Chain;
-use ballbar::wire::{Answer, Command, ParameterSet, WhichSet};
+use ballbar::wire::{Answer, Command, MAX_PAYLOAD, ParameterSet, WhichSet};
+use ballbar::{Chain, LvdtCurve};
 use ballbar_calib::model::{JointLimits, Robot, Standing};
+use serde::Serialize;
 use thiserror::Error;
 
 use super::errors::BoardError;
@@ -121,6 +122,9 @@ pub enum UploadError {
         /// What the rounding does.
         rounding: KinematicsDifference,
     },
+    /// No message has room for the parameters.
+    #[error("the parameters are longer than a message to the board may be")]
+    TooLong,
     /// The board gives back something else than it was given.
     #[error(
         "the {} parameters read back from the board are not those that were sent",
@@ -180,7 +184,7 @@ impl<'a> Upload<'a> {
         }
         let replaced = in_use(link, on_step)?;
         let (curve, lvdt) = match &replaced {
-            Some(old) => (old.lvdt, LvdtOrigin::Kept),
+            Some((_, curve)) => (*curve, LvdtOrigin::Kept),
             None => {
                 on_step(UploadStep::NominalLvdt);
                 (nominal_lvdt(NOMINAL_TRAVEL_M), LvdtOrigin::Nominal)
@@ -188,7 +192,7 @@ impl<'a> Upload<'a> {
         };
         let set = parameter_set(robot, curve)?;
         let wanted = Wanted { set, chain: &robot.chain, limits: &robot.limits, vectors: self.vectors };
-        Ok(store(link, &wanted, on_step)?.uploaded(replaced.as_ref(), lvdt))
+        Ok(store(link, &wanted, on_step)?.uploaded(replaced.map(|(old, _)| old), lvdt))
     }
 }
 
@@ -215,20 +219,24 @@ pub fn bring_back(
         .map(|range| JointLimits { min: f64::from(*range.start()), max: f64::from(*range.end()) })
         .collect();
     let stored = store(link, &Wanted { set, chain: &chain.cast(), limits: &limits, vectors }, on_step)?;
-    Ok(stored.uploaded(replaced.as_ref(), LvdtOrigin::BroughtBack))
+    Ok(stored.uploaded(replaced.map(|(old, _)| old), LvdtOrigin::BroughtBack))
 }
 
-/// What the board uses; nothing where that is not to be believed.
-fn in_use(link: &mut BoardLink, on_step: &mut dyn FnMut(UploadStep)) -> Result<Option<ParameterSet>, BoardError> {
+/// What the board uses, with its LVDT curve; nothing where that is not to be believed.
+fn in_use(link: &mut BoardLink, on_step: &mut dyn FnMut(UploadStep)) -> Result<Option<(SetSummary, LvdtCurve)>, UploadError> {
     // A program that was killed may have left a stream running, and storing would stall it.
     link.act(Command::StopStream)?;
     match RobotOnBoard::read(link) {
-        Ok(old) => Ok(old.map(|(old, _)| old.set().clone())),
+        Ok(None) => Ok(None),
+        Ok(Some((old, _))) => {
+            let crc = ballbar::crc32(&bytes_of(old.set())?);
+            Ok(Some((SetSummary::new(old.set(), crc), old.set().lvdt)))
+        }
         Err(BoardError::Implausible { reason, .. }) => {
             on_step(UploadStep::Unseen(reason));
             Ok(None)
         }
-        Err(error) => Err(error),
+        Err(error) => Err(error.into()),
     }
 }
 
@@ -248,8 +256,7 @@ struct Stored {
 }
 
 impl Stored {
-    fn uploaded(self, replaced: Option<&ParameterSet>, lvdt: LvdtOrigin) -> Uploaded {
-        let replaced = replaced.map(|old| SetSummary::new(old, ballbar::crc32(&bytes_of(old))));
+    fn uploaded(self, replaced: Option<SetSummary>, lvdt: LvdtOrigin) -> Uploaded {
         Uploaded { stored: self.set, replaced, sequence: self.sequence, difference: self.difference, lvdt }
     }
 }
@@ -262,14 +269,15 @@ impl SetSummary {
 
 /// Stages, verifies, stores, reads back.
 fn store(link: &mut BoardLink, wanted: &Wanted<'_>, on_step: &mut dyn FnMut(UploadStep)) -> Result<Stored, UploadError> {
-    let committed = stage_and_verify(link, wanted, on_step)
+    let bytes = bytes_of(&wanted.set)?;
+    let committed = stage_and_verify(link, wanted, &bytes, on_step)
         .and_then(|(crc, difference)| Ok(link.act(Command::Commit { crc }).map(|()| (crc, difference))?));
     if committed.is_err() {
         // What is staged is not in use; without it a later commit cannot store it by mistake.
         let _ = link.act(Command::Discard);
     }
     let (crc, difference) = committed?;
-    check_read_back(link, WhichSet::Active, &wanted.set)?;
+    check_read_back(link, WhichSet::Active, &bytes)?;
     let sequence = match link.request(Command::Status)? {
         Answer::Status(status) => status.active.map_or(0, |active| active.sequence),
         _ => return Err(BoardError::WrongAnswer { command: "status" }.into()),
@@ -281,28 +289,42 @@ fn store(link: &mut BoardLink, wanted: &Wanted<'_>, on_step: &mut dyn FnMut(Uplo
 fn stage_and_verify(
     link: &mut BoardLink,
     wanted: &Wanted<'_>,
+    bytes: &[u8],
     on_step: &mut dyn FnMut(UploadStep),
 ) -> Result<(u32, KinematicsDifference), UploadError> {
     let Wanted { set, chain, limits, vectors } = wanted;
     let Answer::Staged { crc } = link.request(Command::WriteParameters(set.clone()))? else {
         return Err(BoardError::WrongAnswer { command: "write parameters" }.into());
     };
-    check_read_back(link, WhichSet::Staged, set)?;
+    check_read_back(link, WhichSet::Staged, bytes)?;
     let on_vector = || on_step(UploadStep::Compared);
     let difference = verify_kinematics(link, chain, limits, WhichSet::Staged, vectors.get(), on_vector)?;
     if difference.is_small() { Ok((crc, difference)) } else { Err(UploadError::Kinematics(difference)) }
 }
 
 /// Bit for bit, which `==` on floats is not.
-fn check_read_back(link: &mut BoardLink, which: WhichSet, set: &ParameterSet) -> Result<(), UploadError> {
+fn check_read_back(link: &mut BoardLink, which: WhichSet, bytes: &[u8]) -> Result<(), UploadError> {
     match link.request(Command::ReadParameters(which))? {
-        Answer::Parameters(found) if bytes_of(&found) == bytes_of(set) => Ok(()),
+        Answer::Parameters(found) if bytes_of(&found)? == bytes => Ok(()),
         Answer::Parameters(_) => Err(UploadError::ReadBack(which)),
         _ => Err(BoardError::WrongAnswer { command: "read parameters" }.into()),
     }
 }
 
-fn bytes_of(set: &ParameterSet) -> Vec<u8> {
-    let mut buffer = [0; ballbar::wire::MAX_PAYLOAD];
-    postcard::to_slice(set, &mut buffer).map(|bytes| bytes.to_vec()).unwrap_or_default()
+/// As it travels.
+fn bytes_of(set: &impl Serialize) -> Result<Vec<u8>, UploadError> {
+    let mut buffer = [0; MAX_PAYLOAD];
+    postcard::to_slice(set, &mut buffer).map(|bytes| bytes.to_vec()).map_err(|_| UploadError::TooLong)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_message_has_room_for_is_told_from_what_is_empty() {
+        let longest = "x".repeat(MAX_PAYLOAD - 2);
+        assert_eq!(bytes_of(&longest).unwrap().len(), MAX_PAYLOAD);
+        assert!(matches!(bytes_of(&(longest + "x")), Err(UploadError::TooLong)));
+    }
 }

@@ -114,7 +114,7 @@ fn board_pose(link: &mut BoardLink, set: WhichSet, q: WireVector) -> Result<Tool
 }
 
 /// What is not a number is larger than any: `f64::max` would pass over it.
-fn larger(a: f64, b: f64) -> f64 {
+pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 

@@ -16,12 +16,11 @@ use thiserror::Error;
 use super::inputs::{ListError, OutputArgs};
 use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::port::{PortArgs, StillnessArgs};
+use super::recorder::begin_recording;
 use super::report::print;
-use super::stream::say_recovered;
-use crate::board::{BoardLink, RobotOnBoard};
 use crate::collect::{
-    BoardWatch, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, Programs, TrackOptions,
-    read_board, remove_lag,
+    BoardWatch, CheckedBoard, CollectError, CollectOptions, Collector, Guide, Ledger, Mover, Nearness, ProgramOptions, Programs,
+    TrackOptions, remove_lag,
 };
 use crate::operator::{Hand, Still, Terminal};
 use crate::remedies::Remedied;
@@ -142,22 +141,20 @@ impl CollectArgs {
             return Err(ArgumentError::ContinuousByHand.into());
         }
         let programs = self.programs(&mover, &plan, &options)?;
-        let mut link = self.port.connect()?;
-        let robot = read_board(&mut link, &files.robot)?;
+        let board = CheckedBoard::read(self.port.connect()?, &files.robot)?;
         let lock = SessionLock::acquire(&self.session).map_err(lock_error)?;
         files.write(&lock)?;
         let guide = match programs {
             None => Guide::Hand,
             Some(programs) => {
-                programs.write(&self.session).map_err(CommandError::output)?;
+                programs.write(&lock).map_err(CommandError::output)?;
                 Guide::Programs(programs.names)
             }
         };
-        let recorder = self.recorder(&lock, &link, &robot, &mover)?;
+        let recorder = self.recorder(&lock, &board, &mover)?;
         let recovered = recorder.recovered();
         let ledger = Ledger::new(plan, recorder.measured_lines().into_iter(), recorder.skipped_lines().into_iter());
-        let mut board =
-            BoardWatch::begin(link, robot.0, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
+        let mut board = BoardWatch::begin(board, recorder, self.rate, self.stillness.criteria()).map_err(collect_error)?;
 
         let head = vec!["collect".into(), self.port.port.clone(), mover.name(), files.robot.name.clone()];
         let mut hand = self.hand()?;
@@ -241,24 +238,15 @@ impl CollectArgs {
         Nearness { turn_rad: self.near_deg.to_radians(), slide_m: m_from_mm(self.near_mm) }
     }
 
-    fn recorder(
-        &self,
-        lock: &SessionLock,
-        link: &BoardLink,
-        (robot, frame): &(RobotOnBoard, Vec<u8>),
-        mover: &Mover,
-    ) -> Result<Recorder, CommandError> {
+    fn recorder(&self, lock: &SessionLock, board: &CheckedBoard, mover: &Mover) -> Result<Recorder, CommandError> {
+        let link = board.link();
         let run = Run {
             rig: self.rig.clone(),
             robot_link: Some(mover.name()),
             temperature_c: self.temperature_c,
             ..Run::beginning(link.port_name(), link.hello(), self.rate)
         };
-        let mut recorder = Recorder::begin(lock, run, Some(robot.kinds())).map_err(record_error)?;
-        say_recovered(&recorder);
-        recorder.frame(link.hello_frame()).map_err(record_error)?;
-        recorder.frame(frame).map_err(record_error)?;
-        Ok(recorder)
+        begin_recording(lock, run, Some(board.robot().kinds()), &[link.hello_frame(), board.robot_frame()])
     }
 }
 

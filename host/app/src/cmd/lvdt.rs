@@ -116,10 +116,10 @@ impl LvdtArgs {
                 Err(error) => ("not stored: see the error", Err(error)),
             },
         };
-        let curve = fit.curve;
+        let curve = fit.curve();
         let report = LvdtReport {
             degree: self.degree,
-            points: self.lengths.iter().zip(&poses).zip(&fit.residuals_m).map(line).collect(),
+            points: self.lengths.iter().zip(&poses).zip(fit.residuals_m()).map(line).collect(),
             rms_mm: mm_from_m(fit.rms_m()),
             max_abs_mm: mm_from_m(fit.largest_m()),
             code_min: curve.code_min,

@@ -30,6 +30,7 @@ mod port;
 mod ports;
 mod pose;
 mod rank;
+mod recorder;
 mod report;
 mod report_page;
 mod session_words;

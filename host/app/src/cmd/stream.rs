@@ -4,9 +4,10 @@ mod picture;
 mod watch;
 mod words;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use ballbar::Pairing;
 use ballbar::wire::{FrameCounts, StreamSelection};
 use ballbar_calib::model::{Rig, Robot};
 use clap::Args;
@@ -19,12 +20,13 @@ use super::inputs::OutputArgs;
 use super::outcome::{CommandError, Outcome, lock_error, record_error};
 use super::pairings::parse_pairings;
 use super::port::{PortArgs, StillnessArgs};
+use super::recorder::begin_recording;
 use super::report::{Report, print, warn};
-use crate::board::{BoardLink, RobotOnBoard, StreamLosses, check_kinds};
+use crate::board::{BoardLink, RobotOnBoard, StreamLosses};
 use crate::files::{open_rig, open_robot};
-use crate::record::{Account, ExpectedLength, Latest, Watched};
+use crate::record::{Account, Latest, Watched};
 use crate::remedies::Remedied;
-use crate::session::{Connection, ROBOT_NAME, Recorder, Run, SessionLock};
+use crate::session::{Connection, ROBOT_NAME, Run, SessionLock};
 use crate::text::one_line;
 use crate::units::{m_from_mm, mm_from_m};
 
@@ -146,14 +148,12 @@ impl StreamArgs {
         if robot.is_none() && (connection.is_some() || self.pose) {
             return Err(StreamError::NoParameters.into());
         }
-        if let (Some(limits), Some((robot, _))) = (&limits, &robot) {
-            check_kinds(limits, robot.kinds()).map_err(Remedied)?;
+        let (robot, robot_frame) = robot.unzip();
+        let (pairing, criteria) = (self.pairing()?, self.stillness.criteria());
+        let mut account = Account::new(Watched { robot, limits, connection, pairing, criteria }).map_err(Remedied)?;
+        if let Some(session) = &self.session {
+            account = self.record(account, session, &link, robot_frame.as_deref())?;
         }
-        let recorder = self.recorder(&link, robot.as_ref(), connection.clone())?;
-        let robot = robot.map(|(robot, _)| robot);
-        let expected = self.expected_length(robot.as_ref())?;
-        let criteria = self.stillness.criteria();
-        let account = Account::new(Watched { robot, limits, expected, recorder, connection, criteria });
         let mut watch = Watch::new(link, self, account);
         let ended = watch.run();
         let (report, closed) = watch.finish();
@@ -208,21 +208,21 @@ impl StreamArgs {
         Ok(Some(Connection { chuck: chuck.into(), sphere: sphere.into(), bar_m: m_from_mm(bar_mm) }))
     }
 
-    /// What computes lengths, when it is known what the bar joins and where.
-    fn expected_length(&self, robot: Option<&RobotOnBoard>) -> Result<Option<ExpectedLength>, CommandError> {
-        let (Some(rig), Some(pairing), Some(robot)) = (&self.rig, &self.pairing, robot) else { return Ok(None) };
+    /// Where the ends are that the bar joins, as far as that is known.
+    fn pairing(&self) -> Result<Option<Pairing<f64>>, CommandError> {
+        let (Some(rig), Some(pairing)) = (&self.rig, &self.pairing) else { return Ok(None) };
         let rig = open_rig(rig)?;
-        let pairing = parse_pairings(pairing, &rig)?.first().map(|&id| rig.pairing(id));
-        Ok(pairing.and_then(|pairing| ExpectedLength::new(robot, pairing)))
+        Ok(parse_pairings(pairing, &rig)?.first().map(|&id| rig.pairing(id)))
     }
 
-    fn recorder(
+    /// Begins a run in the session, where poses are written when it is known what the bar joins.
+    fn record(
         &self,
+        account: Account,
+        session: &Path,
         link: &BoardLink,
-        robot: Option<&(RobotOnBoard, Vec<u8>)>,
-        connection: Option<Connection>,
-    ) -> Result<Option<Recorder>, CommandError> {
-        let Some(session) = &self.session else { return Ok(None) };
+        robot_frame: Option<&[u8]>,
+    ) -> Result<Account, CommandError> {
         let run = Run {
             rig: self.rig.clone(),
             pairing: self.pairing.clone(),
@@ -230,28 +230,15 @@ impl StreamArgs {
             temperature_c: self.temperature_c,
             ..Run::beginning(link.port_name(), link.hello(), self.rate)
         };
-        let kinds = robot.map_or(&[][..], |(robot, _)| robot.kinds());
         let lock = SessionLock::acquire(session).map_err(lock_error)?;
-        let mut recorder = Recorder::begin(&lock, run, connection.is_some().then_some(kinds)).map_err(record_error)?;
-        say_recovered(&recorder);
-        recorder.frame(link.hello_frame()).map_err(record_error)?;
-        if let Some((_, frame)) = robot {
-            recorder.frame(frame).map_err(record_error)?;
-        }
-        if let Some(connection) = connection {
-            recorder.connect_for_every_settled(connection, self.stillness.criteria()).map_err(record_error)?;
-        }
+        let kinds = account.connection().and(account.robot()).map(RobotOnBoard::kinds);
+        let said: Vec<&[u8]> = [link.hello_frame()].into_iter().chain(robot_frame).collect();
+        let recorder = begin_recording(&lock, run, kinds, &said)?;
+        let account = account.with_recorder(recorder).map_err(record_error)?;
         if self.selection().settled && self.pairing.is_none() {
             warn("without --pairing and --bar the settled poses go to the log and not to poses.csv");
         }
-        Ok(Some(recorder))
-    }
-}
-
-/// Poses of a run that was killed are no surprise, but nothing to hide.
-pub(super) fn say_recovered(recorder: &Recorder) {
-    if recorder.recovered() > 0 {
-        warn(&format!("{} poses that the log held and poses.csv lacked were written into it", recorder.recovered()));
+        Ok(account)
     }
 }
 

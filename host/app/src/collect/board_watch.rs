@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use ballbar::wire::{Answer, Command, Event, Stream, StreamSelection};
 use ballbar::{JointVector, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria};
 
+use super::check_board::CheckedBoard;
 use super::errors::CollectError;
 use super::track::TrackPoint;
 use crate::board::{BoardError, BoardLink, Frame, Refusals, RobotOnBoard, StreamLosses};
@@ -80,12 +81,12 @@ impl BoardWatch {
     /// # Errors
     /// [`CollectError`] when the board refuses or is gone.
     pub fn begin(
-        mut link: BoardLink,
-        robot: RobotOnBoard,
+        board: CheckedBoard,
         recorder: Recorder,
         rate_hz: u16,
         criteria: StillnessCriteria,
     ) -> Result<Self, CollectError> {
+        let CheckedBoard { mut link, robot, .. } = board;
         link.act(Command::SetRate { rate_hz })?;
         link.act(Command::SetStillness(criteria))?;
         link.start_stream(StreamSelection { samples: true, settled: true, poses: false })?;

@@ -7,24 +7,48 @@ use ballbar_calib::model::Robot;
 use super::errors::CollectError;
 use crate::board::{BoardError, BoardLink, RobotOnBoard};
 
-/// Asks the board for its robot, which has to be the plan's and to know where it is. Returns the frame of the reply as well, for a log.
-///
-/// # Errors
-/// [`CollectError::Board`], [`CollectError::NoParameters`], and as [`check_board`].
-pub fn read_board(link: &mut BoardLink, robot: &Robot) -> Result<(RobotOnBoard, Vec<u8>), CollectError> {
-    let (on_board, frame) = RobotOnBoard::read(link)?.ok_or(CollectError::NoParameters)?;
-    let Answer::Status(status) = link.request(Command::Status)? else {
-        return Err(BoardError::WrongAnswer { command: "status" }.into());
-    };
-    check_board(robot, &on_board, on_board.is_homed_by(&status))?;
-    Ok((on_board, frame))
+/// A board that was asked for its robot, which is the plan's and knows where it is.
+pub struct CheckedBoard {
+    pub(super) link: BoardLink,
+    pub(super) robot: RobotOnBoard,
+    robot_frame: Vec<u8>,
+}
+
+impl CheckedBoard {
+    /// Asks the board.
+    ///
+    /// # Errors
+    /// [`CollectError::Board`], [`CollectError::NoParameters`], [`CollectError::OtherRobot`], [`CollectError::NotHomed`].
+    pub fn read(mut link: BoardLink, plans: &Robot) -> Result<Self, CollectError> {
+        let (robot, robot_frame) = RobotOnBoard::read(&mut link)?.ok_or(CollectError::NoParameters)?;
+        let Answer::Status(status) = link.request(Command::Status)? else {
+            return Err(BoardError::WrongAnswer { command: "status" }.into());
+        };
+        check_board(plans, &robot, robot.is_homed_by(&status))?;
+        Ok(Self { link, robot, robot_frame })
+    }
+
+    /// The conversation with it.
+    pub fn link(&self) -> &BoardLink {
+        &self.link
+    }
+
+    /// The parameters that it uses.
+    pub fn robot(&self) -> &RobotOnBoard {
+        &self.robot
+    }
+
+    /// The frame in which it said so, for a log.
+    pub fn robot_frame(&self) -> &[u8] {
+        &self.robot_frame
+    }
 }
 
 /// A board counts as the plan's robot does, and knows where it is.
 ///
 /// # Errors
 /// [`CollectError::OtherRobot`], [`CollectError::NotHomed`].
-pub fn check_board(robot: &Robot, board: &RobotOnBoard, is_homed: bool) -> Result<(), CollectError> {
+pub(super) fn check_board(robot: &Robot, board: &RobotOnBoard, is_homed: bool) -> Result<(), CollectError> {
     let other = |what: String| Err(CollectError::OtherRobot { what });
     let (found, expected) = (board.kinds(), robot.chain.joint_kinds());
     if found != expected {

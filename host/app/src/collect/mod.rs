@@ -30,7 +30,7 @@ mod talker;
 mod track;
 
 pub use board_watch::{BoardWatch, Stand, View};
-pub use check_board::{check_board, read_board};
+pub use check_board::CheckedBoard;
 pub use collector::{CollectOptions, Collector, Ended, Summary};
 pub use errors::CollectError;
 pub use follow::{Guide, ShellPrograms};

@@ -1,8 +1,6 @@
 //! A plan as programs of a controller: for each shell one that brings the robot there, without the bar, and one that measures. Their
 //! files are kept in the session.
 
-use std::path::Path;
-
 use ballbar_calib::plan::{CheckedPlan, PlanRow, RowKind};
 
 use super::follow::ShellPrograms;
@@ -10,7 +8,7 @@ use super::ledger::shells;
 use crate::files::{FilesError, make_folder, write_atomically};
 use crate::robot_link::JointSpeed;
 use crate::robot_link::program::{ControllerSetup, Dialect, Program, ProgramError, ProgramFile, ProgramStep, write_program};
-use crate::session::{Connection, PROGRAMS_NAME};
+use crate::session::{Connection, PROGRAMS_NAME, SessionLock};
 
 /// How a plan's programs go over its rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,8 +99,8 @@ impl Programs {
     ///
     /// # Errors
     /// [`FilesError`].
-    pub fn write(&self, session: &Path) -> Result<(), FilesError> {
-        let folder = session.join(PROGRAMS_NAME);
+    pub fn write(&self, lock: &SessionLock) -> Result<(), FilesError> {
+        let folder = lock.session().join(PROGRAMS_NAME);
         make_folder(&folder)?;
         for ProgramFile { name, text } in &self.files {
             write_atomically(&folder.join(name), text)?;

@@ -1,27 +1,25 @@
 //! What came of a stream so far: counts, losses, the latest values, and the recording.
 
 use ballbar::wire::{Event, Status, Stream};
-use ballbar::{JointVector, SettleDetector, SettledPose, StillnessCriteria};
+use ballbar::{JointVector, Pairing, SettleDetector, SettledPose, StillnessCriteria};
 use ballbar_calib::model::{BeyondLimits, Robot};
 
 use super::latest::{ExpectedLength, Latest};
 use super::news::{Fate, News, Settled, SettledAt};
-use crate::board::{Frame, Refusals, RobotOnBoard, StreamLosses};
+use crate::board::{Frame, OtherRobot, Refusals, RobotOnBoard, StreamLosses, check_kinds};
 use crate::session::{Connection, RecordError, Recorder, SettledFate, SettledRule};
 use crate::units::{mm_from_m, tidy};
 
-/// What is known of the arm before anything comes, and where what comes is kept.
+/// What is known of the arm before anything comes.
 pub struct Watched {
     /// The parameters that the board uses.
     pub robot: Option<RobotOnBoard>,
     /// The robot's file, for its limits.
     pub limits: Option<Robot>,
-    /// What computes lengths, where that can be.
-    pub expected: Option<ExpectedLength>,
-    /// Of the session, where one is recorded.
-    pub recorder: Option<Recorder>,
     /// What the bar joins.
     pub connection: Option<Connection>,
+    /// Where in the rig that is.
+    pub pairing: Option<Pairing<f64>>,
     /// When the arm stands still.
     pub criteria: StillnessCriteria,
 }
@@ -48,6 +46,10 @@ pub struct Counts {
 /// The books of one run.
 pub struct Account {
     watched: Watched,
+    /// What computes lengths, where that can be.
+    expected: Option<ExpectedLength>,
+    /// Of the session, where one is recorded.
+    recorder: Option<Recorder>,
     counts: Counts,
     /// Poses of earlier runs that the log held and poses.csv lacked.
     recovered: usize,
@@ -68,11 +70,20 @@ pub struct Account {
 }
 
 impl Account {
-    /// At the beginning of a run.
-    pub fn new(watched: Watched) -> Self {
-        Self {
+    /// At the beginning of a run that is not recorded.
+    ///
+    /// # Errors
+    /// [`OtherRobot`] when the limits are not those of the board's robot.
+    pub fn new(watched: Watched) -> Result<Self, OtherRobot> {
+        if let (Some(limits), Some(robot)) = (&watched.limits, &watched.robot) {
+            check_kinds(limits, robot.kinds())?;
+        }
+        let between = watched.robot.as_ref().zip(watched.pairing);
+        Ok(Self {
+            expected: between.and_then(|(robot, pairing)| ExpectedLength::new(robot, pairing)),
+            recorder: None,
             counts: Counts::default(),
-            recovered: watched.recorder.as_ref().map_or(0, Recorder::recovered),
+            recovered: 0,
             said_beyond: Vec::new(),
             losses: StreamLosses::default(),
             losses_before: StreamLosses::default(),
@@ -83,7 +94,20 @@ impl Account {
             detector: SettleDetector::new(watched.criteria),
             clock: None,
             watched,
+        })
+    }
+
+    /// Records from here on. Every settled pose is one of the connection, by the criteria: the log has both, so that what is recovered
+    /// from it is what would have been written.
+    ///
+    /// # Errors
+    /// [`RecordError::Log`], [`RecordError::LongNames`].
+    pub fn with_recorder(self, mut recorder: Recorder) -> Result<Self, RecordError> {
+        match self.watched.connection.clone() {
+            Some(connection) => recorder.connect_for_every_settled(connection, self.watched.criteria)?,
+            None => recorder.connect(None)?,
         }
+        Ok(Self { recovered: recorder.recovered(), recorder: Some(recorder), ..self })
     }
 
     /// The parameters that the board uses.
@@ -94,6 +118,11 @@ impl Account {
     /// What the bar joins.
     pub fn connection(&self) -> Option<&Connection> {
         self.watched.connection.as_ref()
+    }
+
+    /// When the arm stands still.
+    pub fn criteria(&self) -> StillnessCriteria {
+        self.watched.criteria
     }
 
     /// Whether it is known where the limits of the joints are.
@@ -133,7 +162,7 @@ impl Account {
 
     /// Measured less expected length, millimetres, where both are known.
     pub fn residual_mm(&self) -> Option<f64> {
-        Some(self.latest.length_mm? - self.watched.expected.as_ref()?.length_mm(self.latest.q.as_ref()?)?)
+        Some(self.latest.length_mm? - self.expected.as_ref()?.length_mm(self.latest.q.as_ref()?)?)
     }
 
     /// Samples a second by the board's clock.
@@ -148,7 +177,7 @@ impl Account {
     /// # Errors
     /// [`RecordError`] when it, or the pose in it, cannot be kept.
     pub fn take(&mut self, frame: &Frame) -> Result<Option<News>, RecordError> {
-        if let Some(recorder) = &mut self.watched.recorder {
+        if let Some(recorder) = &mut self.recorder {
             recorder.frame(&frame.bytes)?;
         }
         let stream = match &frame.message {
@@ -204,7 +233,7 @@ impl Account {
         self.clock = None;
         self.detector.restart();
         self.rule.lose_port();
-        self.watched.recorder.as_mut().map_or(Ok(()), Recorder::lost)
+        self.recorder.as_mut().map_or(Ok(()), Recorder::lost)
     }
 
     /// The port is back, with the frames in which the board said what it is and, maybe, what it uses.
@@ -212,7 +241,7 @@ impl Account {
     /// # Errors
     /// [`RecordError`].
     pub fn regain(&mut self, hello_frame: &[u8], robot_frame: Option<&[u8]>) -> Result<(), RecordError> {
-        let Some(recorder) = &mut self.watched.recorder else { return Ok(()) };
+        let Some(recorder) = &mut self.recorder else { return Ok(()) };
         recorder.back()?;
         recorder.frame(hello_frame)?;
         robot_frame.map_or(Ok(()), |frame| recorder.frame(frame))
@@ -223,7 +252,7 @@ impl Account {
     /// # Errors
     /// [`RecordError`], the first of several.
     pub fn end(&mut self) -> Result<(), RecordError> {
-        self.watched.recorder.take().map_or(Ok(()), Recorder::end)
+        self.recorder.take().map_or(Ok(()), Recorder::end)
     }
 
     fn take_settled(&mut self, pose: &SettledPose, stream: &Stream) -> Result<Settled, RecordError> {
@@ -252,8 +281,8 @@ impl Account {
 
     /// Writes a pose with a length, where poses are written.
     fn keep(&mut self, pose: &SettledPose, homed: u8) -> Result<Fate, RecordError> {
-        let Watched { robot: Some(robot), recorder, .. } = &mut self.watched else { return Ok(Fate::Seen { is_homed: false }) };
-        let Some(recorder) = recorder.as_mut().filter(|recorder| recorder.writes_poses()) else {
+        let Some(robot) = &self.watched.robot else { return Ok(Fate::Seen { is_homed: false }) };
+        let Some(recorder) = self.recorder.as_mut().filter(|recorder| recorder.writes_poses()) else {
             return Ok(Fate::Seen { is_homed: robot.is_homed(homed) });
         };
         match self.rule.judge(robot, pose, homed) {

@@ -33,21 +33,21 @@ pub struct Latest {
 
 /// Computes the length that the board's parameters expect.
 #[derive(Clone, Debug)]
-pub struct ExpectedLength {
+pub(super) struct ExpectedLength {
     chain: Chain<f64>,
     pairing: Pairing<f64>,
 }
 
 impl ExpectedLength {
     /// Between the ends that the bar joins; `None` when the board's parameters make no chain.
-    pub fn new(robot: &RobotOnBoard, pairing: Pairing<f64>) -> Option<Self> {
+    pub(super) fn new(robot: &RobotOnBoard, pairing: Pairing<f64>) -> Option<Self> {
         let parameters: Vec<f64> = robot.set().parameters.iter().map(|&value| f64::from(value)).collect();
         let chain = Chain::new(robot.kinds(), &parameters).ok()?;
         Some(Self { chain, pairing })
     }
 
     /// Millimetres, at joint values in degrees or millimetres.
-    pub fn length_mm(&self, q: &[f64]) -> Option<f64> {
+    pub(super) fn length_mm(&self, q: &[f64]) -> Option<f64> {
         let si: Vec<f64> = self.chain.joint_kinds().iter().zip(q).map(|(&kind, &q)| ScreenUnit::from(kind).to_si(q)).collect();
         let q = self.chain.joint_vector(&si).ok()?;
         Some(mm_from_m(Kinematics::new(&self.chain).length(&q, &self.pairing)))

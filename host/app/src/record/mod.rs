@@ -12,6 +12,6 @@ mod news;
 mod recording;
 
 pub use account::{Account, Counts, Watched};
-pub use latest::{ExpectedLength, Latest, stillness_name};
+pub use latest::{Latest, stillness_name};
 pub use news::{Fate, News, Settled, SettledAt};
 pub use recording::{Changed, Ended, Recording, RecordingError, StreamSettings};

@@ -13,7 +13,7 @@ use crate::board::{BoardError, BoardLink, PortError, RobotOnBoard};
 use crate::deadline::StopFlag;
 use crate::session::{BoardDescription, RecordError};
 
-/// What a board is told, whenever it is there.
+/// What a board is told, whenever it is there, besides when the arm stands still, which is the account's.
 #[derive(Clone, Debug)]
 pub struct StreamSettings {
     /// Its port.
@@ -22,8 +22,6 @@ pub struct StreamSettings {
     pub baud: u32,
     /// Samples a second.
     pub rate_hz: u16,
-    /// When the arm stands still.
-    pub criteria: StillnessCriteria,
     /// What is streamed.
     pub selection: StreamSelection,
     /// Whether it is asked for its status all the time, since without samples nothing else tells how the arm stands.
@@ -124,7 +122,7 @@ impl Recording {
     /// [`RecordingError::Board`].
     pub fn begin(&mut self) -> Result<(), RecordingError> {
         let Link::Up(link) = &mut self.link else { return Ok(()) };
-        match self.settings.start(link) {
+        match self.settings.start(link, self.account.criteria()) {
             // Whoever asks for the next step sees that the user wants to end.
             Ok(()) | Err(BoardError::Stopped) => Ok(()),
             Err(error) => Err(error.into()),
@@ -241,7 +239,7 @@ impl Recording {
     fn regain(&self) -> Result<(BoardLink, Option<Vec<u8>>), BoardError> {
         let mut link = BoardLink::connect_until(&self.settings.port, self.settings.baud, &self.stop)?;
         let robot = RobotOnBoard::read(&mut link)?;
-        self.settings.start(&mut link)?;
+        self.settings.start(&mut link, self.account.criteria())?;
         Ok((link, robot.map(|(_, frame)| frame)))
     }
 
@@ -262,9 +260,9 @@ impl Recording {
 }
 
 impl StreamSettings {
-    fn start(&self, link: &mut BoardLink) -> Result<(), BoardError> {
+    fn start(&self, link: &mut BoardLink, criteria: StillnessCriteria) -> Result<(), BoardError> {
         link.act(Command::SetRate { rate_hz: self.rate_hz })?;
-        link.act(Command::SetStillness(self.criteria))?;
+        link.act(Command::SetStillness(criteria))?;
         link.start_stream(self.selection)
     }
 }

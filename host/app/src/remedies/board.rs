@@ -59,7 +59,7 @@ impl Remedy for UploadError {
                 "An older host-cal wrote it, or somebody changed it. Fit the design to the poses again: host-cal fit … --out \
                  calibrated.toml. To upload it as it is: --uncalibrated"
             }
-            Self::TooManyJoints { .. } => "Nothing was changed on the board.",
+            Self::TooManyJoints { .. } | Self::TooLong => "Nothing was changed on the board.",
             Self::Coarse { .. } => {
                 "Nothing was changed on the board. Large lengths that cancel cost digits: describe the robot by frames near the arm."
             }

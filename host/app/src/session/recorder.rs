@@ -21,7 +21,8 @@ use super::{LOG_NAME, now};
 pub struct Recorder {
     log: LogWriter,
     poses: Option<PoseFile>,
-    connection: Option<Connection>,
+    /// As the log has it: what the bar joins, and the criteria by which every settled pose is measured.
+    connected: Option<(Connection, Option<StillnessCriteria>)>,
     description: DescriptionFile,
     recovered: usize,
     /// Somebody else's change of poses.csv is in the log already.
@@ -48,8 +49,8 @@ impl Recorder {
         description.write()?;
         let (file, recovered) = recovery.write()?;
         let poses = file.filter(|_| kinds.is_some());
-        let (connection, is_change_noted, synced) = (None, false, Instant::now());
-        Ok(Self { log, poses, connection, description, recovered, is_change_noted, synced, _lock: lock.clone() })
+        let (connected, is_change_noted, synced) = (None, false, Instant::now());
+        Ok(Self { log, poses, connected, description, recovered, is_change_noted, synced, _lock: lock.clone() })
     }
 
     /// Poses of earlier runs that the log held and poses.csv lacked, and that were written when this run began.
@@ -62,7 +63,7 @@ impl Recorder {
     /// # Errors
     /// [`RecordError::Log`], [`RecordError::LongNames`].
     pub fn connect(&mut self, connection: Option<Connection>) -> Result<(), RecordError> {
-        self.connect_and(connection, None)
+        self.note_connected(connection.map(|connection| (connection, None)))
     }
 
     /// From here on every settled pose is one of this connection, by [`super::SettledRule`] with these criteria.
@@ -70,25 +71,21 @@ impl Recorder {
     /// # Errors
     /// [`RecordError::Log`], [`RecordError::LongNames`].
     pub fn connect_for_every_settled(&mut self, connection: Connection, criteria: StillnessCriteria) -> Result<(), RecordError> {
-        self.connect_and(Some(connection), Some(criteria))
+        self.note_connected(Some((connection, Some(criteria))))
     }
 
-    fn connect_and(
-        &mut self,
-        connection: Option<Connection>,
-        every_settled: Option<StillnessCriteria>,
-    ) -> Result<(), RecordError> {
-        if connection == self.connection {
+    fn note_connected(&mut self, connected: Option<(Connection, Option<StillnessCriteria>)>) -> Result<(), RecordError> {
+        if connected == self.connected {
             return Ok(());
         }
-        let mark = match connection.clone() {
-            Some(connection) => PoseMark::Connected { connection, every_settled },
+        let mark = match connected.clone() {
+            Some((connection, every_settled)) => PoseMark::Connected { connection, every_settled },
             None => PoseMark::Disconnected,
         };
-        let bytes = connection.as_ref().map_or(0, |Connection { chuck, sphere, .. }| chuck.len() + sphere.len());
+        let bytes = connected.as_ref().map_or(0, |(Connection { chuck, sphere, .. }, _)| chuck.len() + sphere.len());
         let frame = mark.frame().ok_or(RecordError::LongNames { bytes })?;
         self.log.frame(&frame)?;
-        self.connection = connection;
+        self.connected = connected;
         Ok(())
     }
 
@@ -108,7 +105,7 @@ impl Recorder {
 
     /// Whether settled poses go to poses.csv.
     pub fn writes_poses(&self) -> bool {
-        self.poses.is_some() && self.connection.is_some()
+        self.poses.is_some() && self.connected.is_some()
     }
 
     /// Keeps poses.
@@ -116,7 +113,7 @@ impl Recorder {
     /// # Errors
     /// [`RecordError::Poses`], [`RecordError::Log`], [`RecordError::NotConnected`].
     pub fn poses(&mut self, poses: &[MeasuredPose]) -> Result<(), RecordError> {
-        let (Some(file), Some(connection)) = (&mut self.poses, &self.connection) else {
+        let (Some(file), Some((connection, _))) = (&mut self.poses, &self.connected) else {
             return Err(RecordError::NotConnected);
         };
         for pose in poses {

@@ -25,7 +25,6 @@ impl<'a> Watch<'a> {
             port: args.port.port.clone(),
             baud: args.port.baud,
             rate_hz: args.rate,
-            criteria: args.stillness.criteria(),
             selection: args.selection(),
             asks_status: screen.is_steady() && !args.selection().samples,
         };
