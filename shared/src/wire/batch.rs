@@ -4,7 +4,7 @@ use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::messages::ToolPose;
+use super::tool_pose::ToolPose;
 use crate::{Counts, LvdtReading, Sample};
 
 /// Samples in one batch, the first included: as many as fit into a frame when every one of eight encoders leaps at every sample.

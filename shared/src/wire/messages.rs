@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::batch::{PoseBatch, SampleBatch};
 use super::parameter_set::{ParameterSet, ParameterSetError, SetIdentity};
 use super::status::{SelfTest, Status};
-use crate::{LvdtCurve, MAX_JOINTS, Pose, SettledPose, StillnessCriteria};
+use super::stream_selection::StreamSelection;
+use super::tool_pose::ToolPose;
+use crate::{LvdtCurve, MAX_JOINTS, SettledPose, StillnessCriteria};
 
 /// The protocol that this crate speaks.
 pub const PROTOCOL: ProtocolVersion = ProtocolVersion {
@@ -187,17 +189,6 @@ pub enum WhichSet {
     Staged,
 }
 
-/// What to stream, any mix.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct StreamSelection {
-    /// Every sample.
-    pub samples: bool,
-    /// A pose whenever the arm has stood still.
-    pub settled: bool,
-    /// The corrected pose of the tool, at most 1,000 a second.
-    pub poses: bool,
-}
-
 /// The answer to a request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Reply {
@@ -309,24 +300,6 @@ pub enum Event {
     Settled(SettledPose),
     /// Corrected poses of the tool.
     Poses(PoseBatch),
-}
-
-/// Pose of the tool frame in the base frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
-pub struct ToolPose {
-    /// Origin of the tool frame, metres.
-    pub position_m: [f32; 3],
-    /// The tool's x axis in the base frame.
-    pub x_axis: [f32; 3],
-    /// The tool's y axis in the base frame; z is their cross product.
-    pub y_axis: [f32; 3],
-}
-
-impl From<&Pose<f32>> for ToolPose {
-    fn from(pose: &Pose<f32>) -> Self {
-        let column = |i| pose.rotation.fixed_view::<3, 1>(0, i).into_owned().into();
-        Self { position_m: pose.translation_m.into(), x_axis: column(0), y_axis: column(1) }
-    }
 }
 
 /// The tool's pose at the latest sample.

@@ -12,12 +12,16 @@ mod frame;
 mod messages;
 mod parameter_set;
 mod status;
+mod stream_selection;
+mod tool_pose;
 
 pub use batch::{MAX_BATCH, MAX_POSE_BATCH, PoseBatch, SampleBatch, SampleStep, StreamedPose};
 pub use frame::{FrameCounts, FrameError, FrameFault, FrameReader, MAX_FRAME, MAX_PAYLOAD, decode, encode};
 pub use messages::{
     Answer, BoardHello, Command, CurrentPose, Event, HostHello, LogMark, PROTOCOL, ProtocolVersion, Refusal, Reply, Request,
-    ResetReason, Stream, StreamSelection, ToBoard, ToHost, ToolPose, WhichSet, hello_version,
+    ResetReason, Stream, ToBoard, ToHost, WhichSet, hello_version,
 };
 pub use parameter_set::{CompiledParameters, MAX_REACH_M, MAX_SPAN_M, ParameterSet, ParameterSetError, SetIdentity};
 pub use status::{Check, CheckResult, EncoderStatus, LinkCounts, SelfTest, SlotState, Status};
+pub use stream_selection::StreamSelection;
+pub use tool_pose::ToolPose;

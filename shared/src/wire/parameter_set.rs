@@ -8,7 +8,7 @@ use heapless::{String, Vec};
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::messages::ToolPose;
+use super::tool_pose::ToolPose;
 use crate::{
     Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve, MAX_COUPLINGS,
     MAX_JOINTS, MAX_PARAMETERS, Parameter, ParameterKind, ParameterUnit,

@@ -4,8 +4,8 @@ use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::messages::StreamSelection;
 use super::parameter_set::SetIdentity;
+use super::stream_selection::StreamSelection;
 use crate::{LvdtReading, MAX_JOINTS, Stillness, StillnessCriteria};
 
 /// Counters and states of everything. Counters count since start and wrap.

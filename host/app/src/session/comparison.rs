@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::logged_poses::{LoggedPose, LoggedPoses};
-use super::pose_file::PoseFileError;
+use super::pose_file_error::PoseFileError;
 use super::recovery::missing_poses;
 use super::{DESCRIPTION_NAME, LOG_NAME};
 use crate::units::{mm_from_m, tidy};

@@ -1,14 +1,13 @@
 //! `poses.csv` of a session, growing pose by pose.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use ballbar::{JointKind, JointVector};
-use miette::Diagnostic;
-use thiserror::Error;
 
-use super::own_file::{ForeignChange, OwnFile, ReplaceError};
-use super::pose_lines::{self, COLUMNS, Damage, plan_row};
-use crate::files::{WriteError, pose_header, pose_record};
+use super::own_file::{ForeignChange, OwnFile};
+use super::pose_file_error::PoseFileError;
+use super::pose_lines::{self, COLUMNS, plan_row};
+use crate::files::{pose_header, pose_record};
 use crate::units::{mm_from_m, tidy};
 
 /// A settled pose as it goes into the file.
@@ -55,67 +54,6 @@ impl Erased {
     /// How many poses.
     pub fn poses(&self) -> usize {
         self.times_us.len()
-    }
-}
-
-/// Why poses cannot be added.
-#[derive(Debug, Error, Diagnostic)]
-pub enum PoseFileError {
-    /// The file is there and cannot be read.
-    #[error("{}: cannot be read: {error}", path.display())]
-    #[diagnostic(help(
-        "Nothing was changed. Mend the file, or move it away, and the poses that the log holds are written anew."
-    ))]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's reason.
-        error: std::io::Error,
-    },
-    /// The file has other columns.
-    #[error("{}:{line}: the columns are `{found}`, expected `{expected}`", path.display())]
-    #[diagnostic(help(
-        "The file is of another robot, or was not written by this program. Record into another directory; or move the file away, and the poses that the log holds are written anew."
-    ))]
-    OtherColumns {
-        /// The file.
-        path: PathBuf,
-        /// Line of its header.
-        line: usize,
-        /// Its header.
-        found: String,
-        /// The header of this robot's poses.
-        expected: String,
-    },
-    /// A line of the file is no pose.
-    #[error("{}:{line}: {damage}", path.display())]
-    #[diagnostic(help(
-        "Nothing was added to the file or changed. Mend the line, or delete it: a pose that the log holds is then written again. To take a pose out, put # before its line."
-    ))]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        damage: Damage,
-    },
-    /// Another program has changed the file.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Changed(#[from] ForeignChange),
-    /// The file cannot be written.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Write(#[from] WriteError),
-}
-
-impl From<ReplaceError> for PoseFileError {
-    fn from(error: ReplaceError) -> Self {
-        match error {
-            ReplaceError::Changed(error) => error.into(),
-            ReplaceError::Write(error) => error.into(),
-        }
     }
 }
 

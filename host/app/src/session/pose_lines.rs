@@ -1,51 +1,14 @@
 //! The lines of a session's `poses.csv`: which are poses, whether they are whole, and what identifies them.
 
-use std::fmt;
 use std::path::Path;
 
-use super::pose_file::PoseFileError;
+use super::pose_file_error::{Damage, PoseFileError};
 
 /// The optional columns that a session's poses have, after the length.
 pub(super) const COLUMNS: [&str; 5] = ["t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
 /// Where some of them stand, counted from the end of a line.
 const TIME_FROM_END: usize = 4;
 const PLAN_ROW_FROM_END: usize = 2;
-
-/// What is wrong with a line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Damage {
-    /// The file ends within it.
-    CutOff,
-    /// It has more or fewer fields than the header.
-    FieldCount {
-        /// Fields of the line.
-        found: usize,
-        /// Fields of the header.
-        expected: usize,
-    },
-    /// It is the header again.
-    HeaderAgain,
-    /// A field holds something else than it should.
-    Field {
-        /// The column.
-        column: String,
-        /// What stands there.
-        found: String,
-        /// What may.
-        expected: &'static str,
-    },
-}
-
-impl fmt::Display for Damage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::CutOff => f.write_str("the file ends within this line, expected the end of a line: was it cut off?"),
-            Self::FieldCount { found, expected } => write!(f, "{found} fields, expected {expected} as in the header"),
-            Self::HeaderAgain => f.write_str("the header stands here again, expected a pose"),
-            Self::Field { column, found, expected } => write!(f, "column `{column}`: `{found}`, expected {expected}"),
-        }
-    }
-}
 
 /// Whether a text is a file of poses with this header to which lines can be added.
 pub(super) fn check(path: &Path, text: &str, header: &str) -> Result<(), PoseFileError> {

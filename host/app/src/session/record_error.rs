@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::description::DescriptionError;
 use super::log::LogError;
-use super::pose_file::PoseFileError;
+use super::pose_file_error::PoseFileError;
 
 /// Why a recording cannot begin or go on.
 #[derive(Debug, Error, Diagnostic)]

@@ -7,7 +7,8 @@ use ballbar::JointKind;
 use super::POSES_NAME;
 use super::lock::SessionLock;
 use super::logged_poses::{LoggedPose, LoggedPoses};
-use super::pose_file::{PoseFile, PoseFileError, SettledRow};
+use super::pose_file::{PoseFile, SettledRow};
+use super::pose_file_error::PoseFileError;
 use super::record_error::RecordError;
 
 /// What there is to write into poses.csv; nothing is written yet.
