@@ -7,8 +7,8 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    MAX_JOINTS, MAX_PARAMETERS, PARAMETERS_OF_LAST_LINK, PARAMETERS_PER_JOINT, Parameter, ParameterKind, ParameterUnit, Real,
-    Row, Vector3,
+    MAX_JOINTS, MAX_PARAMETERS, Number, PARAMETERS_OF_LAST_LINK, PARAMETERS_PER_JOINT, Parameter, ParameterKind, ParameterUnit,
+    Real, Row, Vector3,
 };
 
 /// What a joint does along or about its z axis.
@@ -49,7 +49,7 @@ pub struct Joint<S> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointVector<S>(pub(crate) [S; MAX_JOINTS]);
 
-impl<S: Real> JointVector<S> {
+impl<S: Number> JointVector<S> {
     /// All joints at encoder output zero.
     pub fn zero() -> Self {
         Self([S::zero(); MAX_JOINTS])
@@ -64,7 +64,9 @@ impl<S: Real> JointVector<S> {
     pub fn as_array_mut(&mut self) -> &mut [S; MAX_JOINTS] {
         &mut self.0
     }
+}
 
+impl<S: Real> JointVector<S> {
     /// The same values in another precision.
     pub fn cast<T: Real>(&self) -> JointVector<T> {
         JointVector(self.0.map(|q| T::nearest(q.widen())))
@@ -175,6 +177,13 @@ impl<S: Real> Chain<S> {
         Ok(chain)
     }
 
+    /// The same chain in another precision.
+    pub fn cast<T: Real>(&self) -> Chain<T> {
+        Chain { joints: self.joints, kinds: self.kinds, parameters: self.parameters.map(|value| T::nearest(value.widen())) }
+    }
+}
+
+impl<S: Number> Chain<S> {
     /// Number of joints, J.
     pub fn joints(&self) -> usize {
         self.joints
@@ -205,13 +214,6 @@ impl<S: Real> Chain<S> {
     pub fn unit(&self, parameter: Parameter) -> ParameterUnit {
         let joint = self.kinds.get(parameter.number() - 1).copied().unwrap_or(JointKind::Revolute);
         parameter.kind().unit(joint)
-    }
-
-    /// Adds a change to every parameter; entries of `change` beyond the chain's parameters are ignored.
-    pub fn apply(&mut self, change: &Row<S>) {
-        for (value, delta) in self.parameters_mut().iter_mut().zip(change) {
-            *value += *delta;
-        }
     }
 
     /// Link `i`, counted from 0 at the base; `None` beyond J.
@@ -270,11 +272,6 @@ impl<S: Real> Chain<S> {
         let mut vector = JointVector::zero();
         vector.0[..q.len()].copy_from_slice(q);
         Ok(vector)
-    }
-
-    /// The same chain in another precision.
-    pub fn cast<T: Real>(&self) -> Chain<T> {
-        Chain { joints: self.joints, kinds: self.kinds, parameters: self.parameters.map(|value| T::nearest(value.widen())) }
     }
 }
 

@@ -6,32 +6,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Chain, Joint, JointKind, JointVector, Link, MAX_JOINTS, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Real, Row, Vector3,
+    Chain, Force, Joint, JointKind, JointVector, Link, MAX_JOINTS, Matrix3, Measurement, Number, PARAMETERS_OF_LAST_LINK,
+    PARAMETERS_PER_JOINT, Pairing, Quantity, Real, Row, Vector3,
 };
-
-/// Where the bar's two ends are: a chuck on the table and a sphere on the tool.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound(serialize = "S: Real + Serialize", deserialize = "S: Real + Deserialize<'de>"))]
-pub struct Pairing<S> {
-    /// Centre of the chuck `c` in the base frame, metres.
-    pub chuck_base_m: Vector3<S>,
-    /// Centre of the sphere `s` in the tool (end-effector) frame, metres.
-    pub sphere_tool_m: Vector3<S>,
-}
-
-/// One settled length of the bar, and where the robot stood.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound(serialize = "S: Real + Serialize", deserialize = "S: Real + Deserialize<'de>"))]
-pub struct Measurement<S> {
-    /// The bar's two ends.
-    pub pairing: Pairing<S>,
-    /// Encoder outputs, radians or metres.
-    pub q: JointVector<S>,
-    /// Measured length d, metres.
-    pub length_m: S,
-    /// Weight of the squared residual; 1 when all lengths are equally good.
-    pub weight: S,
-}
 
 /// A rigid pose: `point_base = rotation · point_tool + translation_m`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,7 +54,7 @@ enum Motion<S> {
     Slide { distance_m: S },
 }
 
-impl<S: Real> Kinematics<S> {
+impl<S: Number> Kinematics<S> {
     /// Prepares `chain`: the sines, cosines and rotation of every link.
     pub fn new(chain: &Chain<S>) -> Self {
         let mut links = [LinkGeometry::identity(); MAX_JOINTS + 1];
@@ -93,6 +70,11 @@ impl<S: Real> Kinematics<S> {
             }
         }
         Self { joints: chain.joints(), links, encoders }
+    }
+
+    /// Number of the chain's parameters, 8·J + 6.
+    pub fn parameter_count(&self) -> usize {
+        self.joints * PARAMETERS_PER_JOINT + PARAMETERS_OF_LAST_LINK
     }
 
     /// Pose of the tool at encoder outputs `q`.
@@ -111,18 +93,6 @@ impl<S: Real> Kinematics<S> {
         Pose { rotation: Matrix3::from_columns(&[x_axis, y_axis, x_axis.cross(&y_axis)]), translation_m: origin_m }
     }
 
-    /// How far the tool's origin lies from the base and from the frames between, at encoder outputs `q`.
-    pub fn extent(&self, q: &JointVector<S>) -> Extent<S> {
-        let motions = self.motions(q);
-        let mut origin_m = self.links[self.joints].translation_m;
-        let mut span_m = origin_m.norm();
-        for (link, motion) in self.links[..self.joints].iter().zip(&motions[..self.joints]).rev() {
-            origin_m = link.point(motion.point(origin_m));
-            span_m = span_m.max(origin_m.norm());
-        }
-        Extent { reach_m: origin_m.norm(), span_m }
-    }
-
     /// Position in the base frame of a point of the tool, metres.
     pub fn point_in_base(&self, q: &JointVector<S>, point_tool_m: &Vector3<S>) -> Vector3<S> {
         self.sweep_out(&self.motions(q), point_tool_m)
@@ -130,38 +100,55 @@ impl<S: Real> Kinematics<S> {
 
     /// Computed length `d = |T(q)·s − c|`, metres.
     pub fn length(&self, q: &JointVector<S>, pairing: &Pairing<S>) -> S {
-        (self.point_in_base(q, &pairing.sphere_tool_m) - pairing.chuck_base_m).norm()
+        let bar_m = self.point_in_base(q, &pairing.sphere_tool_m) - pairing.chuck_base_m;
+        bar_m.dot(&bar_m).square_root()
     }
 
-    /// Computed length, metres, and its gradient `∂d/∂p` (the paper's eq. 9 with the sign that descends) into `row`, in metres
-    /// per metre, radian or one. Entries beyond the chain's parameters are left as they are.
-    ///
-    /// When the sphere's centre lies on the chuck's, where the length has no gradient, the row is zero.
-    pub fn length_gradient(&self, q: &JointVector<S>, pairing: &Pairing<S>, row: &mut Row<S>) -> S {
+    /// A quantity at a pairing's sphere, metres, and its gradient by the chain's parameters into `row`, in metres per metre, radian or
+    /// one (of a length: the paper's eq. 9 with the sign that descends). Entries beyond the chain's parameters are left as they are. What
+    /// else it depends on is in the force that is returned.
+    #[inline]
+    pub fn gradient(&self, quantity: Quantity, q: &JointVector<S>, pairing: &Pairing<S>, row: &mut Row<S>) -> Force<S> {
         let motions = self.motions(q);
         let bar_m = self.sweep_out(&motions, &pairing.sphere_tool_m) - pairing.chuck_base_m;
-        let length_m = bar_m.norm();
-        let along_bar = if length_m > S::zero() { bar_m / length_m } else { Vector3::zeros() };
-        // The bar's line of action passes through the chuck as well as the sphere, and the chuck is the exact one of the two.
-        let moment = pairing.chuck_base_m.cross(&along_bar);
-        self.sweep_wrench(q, &motions, along_bar, moment, row);
-        length_m
+        let (value_m, force_base) = match quantity {
+            Quantity::Length => {
+                let length_m = bar_m.dot(&bar_m).square_root();
+                (length_m, bar_m * length_m.inverse())
+            }
+            Quantity::X | Quantity::Y | Quantity::Z => {
+                let axis = quantity as usize;
+                (bar_m[axis], Vector3::ith(axis, S::one()))
+            }
+        };
+        // The force acts at the sphere. Along a bar its line passes through the chuck as well, which is the exact one of the two.
+        let at_m = match quantity {
+            Quantity::Length => pairing.chuck_base_m,
+            Quantity::X | Quantity::Y | Quantity::Z => bar_m + pairing.chuck_base_m,
+        };
+        let force_tool = self.sweep_wrench(q, &motions, force_base, at_m.cross(&force_base), row);
+        Force { value_m, base: force_base, tool: force_tool }
     }
 
-    /// Residual `f = d_measured − d_computed`, metres, and the gradient of the computed length into `row`.
-    pub fn residual_row(&self, measurement: &Measurement<S>, row: &mut Row<S>) -> S {
-        measurement.length_m - self.length_gradient(&measurement.q, &measurement.pairing, row)
+    /// Position in the base frame of a point of the tool, metres, and the gradients of its three coordinates into `rows`.
+    pub fn position_gradient(&self, q: &JointVector<S>, point_tool_m: &Vector3<S>, rows: &mut [Row<S>; 3]) -> Vector3<S> {
+        let from_origin = Pairing { chuck_base_m: Vector3::zeros(), sphere_tool_m: *point_tool_m };
+        let mut position_m = Vector3::zeros();
+        for ((coordinate, quantity), row) in position_m.iter_mut().zip(Quantity::COORDINATES).zip(rows) {
+            *coordinate = self.gradient(quantity, q, &from_origin, row).value_m;
+        }
+        position_m
+    }
+
+    /// Residual `f = d_measured − d_computed`, metres, and the gradient of the computed length into `row`: one row of the equations.
+    pub fn residual_row(&self, measurement: &Measurement<S>, row: &mut Row<S>) -> (S, Force<S>) {
+        let force = self.gradient(Quantity::Length, &measurement.q, &measurement.pairing, row);
+        (measurement.length_m - force.value_m, force)
     }
 
     /// Residual `f = d_measured − d_computed`, metres.
     pub fn residual(&self, measurement: &Measurement<S>) -> S {
         measurement.length_m - self.length(&measurement.q, &measurement.pairing)
-    }
-
-    /// Columns of any force on the tool: for a point `p` of the tool at which the force acts, `∂(force·p)/∂parameters` into
-    /// `row`. Force and moment (about the base origin, `p × force`) are in the base frame.
-    pub fn wrench_columns(&self, q: &JointVector<S>, force_base: Vector3<S>, moment_base: Vector3<S>, row: &mut Row<S>) {
-        self.sweep_wrench(q, &self.motions(q), force_base, moment_base, row);
     }
 
     fn motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
@@ -182,7 +169,7 @@ impl<S: Real> Kinematics<S> {
 
     /// Pushes a wrench from the base down the chain. In each frame on its way the wrench's components are the columns:
     /// a translation's column is the force, a rotation's its moment about that rotation's axis, an offset's the z moment
-    /// (revolute) or z force (prismatic), and the scale's is `q` times the offset's.
+    /// (revolute) or z force (prismatic), and the scale's is `q` times the offset's. The force as the tool frame has it is returned.
     fn sweep_wrench(
         &self,
         q: &JointVector<S>,
@@ -190,34 +177,41 @@ impl<S: Real> Kinematics<S> {
         mut force: Vector3<S>,
         mut moment: Vector3<S>,
         row: &mut Row<S>,
-    ) {
-        for (i, columns) in row.chunks_mut(PARAMETERS_PER_JOINT).take(self.joints + 1).enumerate() {
-            let link = &self.links[i];
-            columns[ParameterKind::X as usize] = force.x;
-            columns[ParameterKind::Y as usize] = force.y;
-            columns[ParameterKind::Z as usize] = force.z;
-            moment -= link.translation_m.cross(&force);
-            columns[ParameterKind::Alpha as usize] = moment.z;
-            // The axis of beta is y turned by alpha; that of gamma is the x axis that the whole rotation leaves behind.
-            columns[ParameterKind::Beta as usize] = link.cos_alpha * moment.y - link.sin_alpha * moment.x;
-            force = link.rotation.tr_mul(&force);
-            moment = link.rotation.tr_mul(&moment);
-            columns[ParameterKind::Gamma as usize] = moment.x;
-
-            if i < self.joints {
-                let column = match motions[i] {
-                    Motion::Turn { .. } => moment.z,
-                    Motion::Slide { .. } => force.z,
-                };
-                columns[ParameterKind::Offset as usize] = column;
-                columns[ParameterKind::Scale as usize] = column * q.0[i];
-                motions[i].push_wrench(&mut force, &mut moment);
-            }
+    ) -> Vector3<S> {
+        // Whole arrays, so that no entry's place has to be looked at; the longest chain's last link stands behind them.
+        let (of_joints, of_longest) = row.as_chunks_mut::<PARAMETERS_PER_JOINT>();
+        let before_joints = self.links.iter().zip(motions).zip(&q.0).take(self.joints);
+        for (columns, ((link, motion), &q)) in of_joints.iter_mut().zip(before_joints) {
+            let [x, y, z, alpha, beta, gamma] = link.push_wrench(&mut force, &mut moment);
+            let offset = match motion {
+                Motion::Turn { .. } => moment.z,
+                Motion::Slide { .. } => force.z,
+            };
+            *columns = [x, y, z, alpha, beta, gamma, offset, offset * q];
+            motion.push_wrench(&mut force, &mut moment);
         }
+        let columns = self.links[self.joints].push_wrench(&mut force, &mut moment);
+        let last = of_joints.get_mut(self.joints).map_or(of_longest, |of_joint| &mut of_joint[..PARAMETERS_OF_LAST_LINK]);
+        last.copy_from_slice(&columns);
+        force
     }
 }
 
-impl<S: Real> LinkGeometry<S> {
+impl<S: Real> Kinematics<S> {
+    /// How far the tool's origin lies from the base and from the frames between, at encoder outputs `q`.
+    pub fn extent(&self, q: &JointVector<S>) -> Extent<S> {
+        let motions = self.motions(q);
+        let mut origin_m = self.links[self.joints].translation_m;
+        let mut span_m = origin_m.norm();
+        for (link, motion) in self.links[..self.joints].iter().zip(&motions[..self.joints]).rev() {
+            origin_m = link.point(motion.point(origin_m));
+            span_m = span_m.max(origin_m.norm());
+        }
+        Extent { reach_m: origin_m.norm(), span_m }
+    }
+}
+
+impl<S: Number> LinkGeometry<S> {
     fn new(link: Link<S>) -> Self {
         let (sa, ca) = link.alpha_rad.sine_cosine();
         let (sb, cb) = link.beta_rad.sine_cosine();
@@ -244,9 +238,21 @@ impl<S: Real> LinkGeometry<S> {
     fn point(&self, point_m: Vector3<S>) -> Vector3<S> {
         self.rotation * point_m + self.translation_m
     }
+
+    /// Turns a wrench from the proximal frame into the distal one; the columns of the link's `x y z alpha beta gamma`.
+    fn push_wrench(&self, force: &mut Vector3<S>, moment: &mut Vector3<S>) -> [S; PARAMETERS_OF_LAST_LINK] {
+        let [x, y, z] = [force.x, force.y, force.z];
+        *moment -= self.translation_m.cross(force);
+        let alpha = moment.z;
+        // The axis of beta is y turned by alpha; that of gamma is the x axis that the whole rotation leaves behind.
+        let beta = self.cos_alpha * moment.y - self.sin_alpha * moment.x;
+        *force = self.rotation.tr_mul(force);
+        *moment = self.rotation.tr_mul(moment);
+        [x, y, z, alpha, beta, moment.x]
+    }
 }
 
-impl<S: Real> Motion<S> {
+impl<S: Number> Motion<S> {
     /// What a joint does at encoder output `q`.
     fn new(joint: &Joint<S>, q: S) -> Self {
         let theta = joint.offset + joint.scale * q;

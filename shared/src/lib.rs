@@ -7,9 +7,10 @@
 //! ```text
 //! counters ──ExtendedCounter──▶ Sample ──SettleDetector──▶ SettledPose ──JointEncoders::q, LvdtCurve──▶ q, length
 //!
-//! Chain ──Kinematics::new──▶ Kinematics ──residual_row(Measurement)──▶ residual f, row ∂d/∂p
-//!                                                                           │ NormalEquations::add
-//! new parameters ◀──Chain::apply── Step ◀──DampedSolver::solve(λ)── JᵀWJ, JᵀWf
+//! Chain ──Kinematics::new──▶ Kinematics, Measurements ──LengthRows::compute──▶ residuals f, rows ∂d/∂p, forces
+//!                                                                                   │ NormalEquations::add
+//! new values ◀──Problem::moved── Step ◀──DampedSolver::solve(λ)── JᵀWJ, JᵀWf
+//!                            (minimise: from Problem to Minimum)
 //! ```
 //!
 //! Units are SI throughout: metres, radians, and wrenches of a dimensionless unit force along the bar. Frames stand in the names:
@@ -21,9 +22,13 @@
 mod chain;
 mod crc32;
 mod kinematics;
+mod lengths;
+mod lm;
+mod measurement;
 mod normal;
 mod parameter;
 mod real;
+mod rows;
 mod sensing;
 mod step;
 mod trig;
@@ -31,10 +36,14 @@ pub mod wire;
 
 pub use chain::{Chain, ChainError, Joint, JointKind, JointVector, Link};
 pub use crc32::{crc32, crc32_digest};
-pub use kinematics::{Extent, Kinematics, Measurement, Pairing, Pose};
-pub use normal::{FreeParameters, FreeParametersError, FreeSetMismatch, NormalEquations};
+pub use kinematics::{Extent, Kinematics, Pose};
+pub use lengths::{FreeParameters, FreeParametersError, Lengths};
+pub use lm::{ConvergenceTest, LmOptions, Minimum, Problem, Status, lm_memory, minimise};
+pub use measurement::{Force, Measurement, Pairing, Quantity};
+pub use normal::{MemoryTooShort, NormalEquations, Precision, SizeMismatch};
 pub use parameter::{Parameter, ParameterKind, ParameterUnit, UnknownParameter};
-pub use real::Real;
+pub use real::{Number, Real};
+pub use rows::{LANES, Lanes, LengthRows, Rows};
 pub use sensing::{
     CounterWidth, Counts, Coupling, Encoder, EncoderError, ExtendedCounter, IndexCheck, JointEncoders, LVDT_COEFFICIENTS,
     LvdtCurve, LvdtFault, LvdtReading, MAX_COUPLINGS, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria,

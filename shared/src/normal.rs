@@ -1,198 +1,182 @@
-//! Incremental normal equations `JᵀWJ Δp = JᵀWf` over any subset of a chain's parameters.
+//! Incremental normal equations `(JᵀWJ + Λ) Δx = JᵀWf − Λ(x − x₀)` over any list of unknowns.
 
 use core::fmt;
 
-use heapless::Vec;
+use crate::Real;
+use crate::rows::{LANES, Lanes, Rows};
 
-use crate::{MAX_PARAMETERS, Real, Row};
-
-/// Entries of a packed triangle over all parameters.
-pub(crate) const PACKED: usize = MAX_PARAMETERS * (MAX_PARAMETERS + 1) / 2;
-
-/// The parameters that a solve may change: indices in ascending order, none twice.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FreeParameters(Vec<u8, MAX_PARAMETERS>);
-
-/// Why a set of free parameters could not be made: the index repeats, is out of order or is beyond [`MAX_PARAMETERS`].
+/// What was lent is too short for so many unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FreeParametersError {
-    /// The offending index.
-    pub index: usize,
+pub struct MemoryTooShort {
+    /// Numbers that are needed.
+    pub needed: usize,
+    /// Numbers that were lent.
+    pub lent: usize,
 }
 
-impl fmt::Display for FreeParametersError {
+impl fmt::Display for MemoryTooShort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "free parameter {} repeats, is out of order or is beyond {MAX_PARAMETERS}", self.index)
+        write!(f, "memory for {} numbers, expected {} at least", self.lent, self.needed)
     }
 }
 
-impl core::error::Error for FreeParametersError {}
+impl core::error::Error for MemoryTooShort {}
 
-impl FreeParameters {
-    /// The first `count` parameters, at most [`MAX_PARAMETERS`]: all of a chain's when `count` is its parameter count.
-    pub fn all(count: usize) -> Self {
-        Self((0..count.min(MAX_PARAMETERS)).map(|index| index as u8).collect())
+/// Takes the first `count` numbers of what was lent.
+pub(crate) fn take<'a, S>(lent: &mut &'a mut [S], count: usize) -> Result<&'a mut [S], MemoryTooShort> {
+    if lent.len() < count {
+        return Err(MemoryTooShort { needed: count, lent: lent.len() });
     }
-
-    /// The parameters at `indices`, which must ascend.
-    ///
-    /// # Errors
-    /// [`FreeParametersError`] with the first index that does not ascend or that no chain has.
-    pub fn from_indices(indices: impl IntoIterator<Item = usize>) -> Result<Self, FreeParametersError> {
-        let mut free: Vec<u8, MAX_PARAMETERS> = Vec::new();
-        for index in indices {
-            let ascends = free.last().is_none_or(|&last| usize::from(last) < index);
-            if index >= MAX_PARAMETERS || !ascends || free.push(index as u8).is_err() {
-                return Err(FreeParametersError { index });
-            }
-        }
-        Ok(Self(free))
-    }
-
-    /// Those of the first `count` parameters whose index `is_free` admits.
-    pub fn filtered(count: usize, is_free: impl Fn(usize) -> bool) -> Self {
-        Self((0..count.min(MAX_PARAMETERS)).filter(|&index| is_free(index)).map(|index| index as u8).collect())
-    }
-
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Whether nothing is free.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// The indices, ascending.
-    pub fn indices(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
-        self.0.iter().map(|&index| usize::from(index))
-    }
-
-    /// Whether the parameter at `index` is free.
-    pub fn contains(&self, index: usize) -> bool {
-        self.indices().any(|free| free == index)
-    }
+    let (taken, rest) = core::mem::take(lent).split_at_mut(count);
+    *lent = rest;
+    Ok(taken)
 }
 
-/// Two accumulators are over different parameters and cannot be merged.
+/// Entries of the lower triangle of a square matrix of so many rows.
+pub(crate) const fn triangle(rows: usize) -> usize {
+    rows * (rows + 1) / 2
+}
+
+/// Two equations are over different numbers of unknowns and cannot be merged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FreeSetMismatch;
+pub struct SizeMismatch;
 
-impl fmt::Display for FreeSetMismatch {
+impl fmt::Display for SizeMismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the two normal equations are over different free parameters")
+        f.write_str("the two normal equations are over different numbers of unknowns")
     }
 }
 
-impl core::error::Error for FreeSetMismatch {}
+impl core::error::Error for SizeMismatch {}
 
-/// `JᵀWJ` (packed), `JᵀWf` and `Σ w f²`, gathered row by row; no row is kept.
-///
-/// 10 KiB in `f32`, 20 KiB in `f64`: keep it in a static or a box, not on a small stack.
-#[derive(Clone, Debug)]
-pub struct NormalEquations<S> {
-    free: FreeParameters,
+/// How sure the values are that unknowns had before anything was measured: the inverse of their covariance, in the unit of the weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Precision<'a, S> {
+    /// One entry an unknown: `σ²/tolerance²`, σ the deviation of a measurement of weight one. Zero: not known at all.
+    Diagonal(&'a [S]),
+    /// The lower triangle by rows: entry (i, j ≤ i) at i(i+1)/2 + j.
+    Full(&'a [S]),
+}
+
+/// `JᵀWJ + Λ` (packed), `JᵀWf − Λ(x − x₀)` and `Σ w f² + (x − x₀)ᵀΛ(x − x₀)`, gathered block by block in memory that is lent; no row is kept.
+#[derive(Debug)]
+pub struct NormalEquations<'a, S> {
     /// Lower triangle by rows: entry (i, j ≤ i) at i(i+1)/2 + j.
-    packed: [S; PACKED],
-    gradient: Row<S>,
+    packed: &'a mut [S],
+    gradient: &'a mut [S],
     cost: S,
+    prior_cost: S,
     weight: S,
     rows: usize,
 }
 
-impl<S: Real> NormalEquations<S> {
-    /// Empty equations over the free parameters.
-    pub fn new(free: FreeParameters) -> Self {
-        Self {
-            free,
-            packed: [S::zero(); PACKED],
-            gradient: [S::zero(); MAX_PARAMETERS],
-            cost: S::zero(),
-            weight: S::zero(),
-            rows: 0,
-        }
+impl<'a, S: Real> NormalEquations<'a, S> {
+    /// Numbers of memory that so many unknowns need: 702 for 36, 1,539 for 54.
+    pub const fn memory(unknowns: usize) -> usize {
+        triangle(unknowns) + unknowns
+    }
+
+    /// Empty equations over so many unknowns, in memory that is lent.
+    ///
+    /// # Errors
+    /// [`MemoryTooShort`] when that is less than [`NormalEquations::memory`].
+    pub fn new(unknowns: usize, mut memory: &'a mut [S]) -> Result<Self, MemoryTooShort> {
+        let (needed, lent) = (Self::memory(unknowns), memory.len());
+        let mut part = |count| take(&mut memory, count).map_err(|_| MemoryTooShort { needed, lent });
+        let (packed, gradient) = (part(triangle(unknowns))?, part(unknowns)?);
+        let mut equations = Self { packed, gradient, cost: S::zero(), prior_cost: S::zero(), weight: S::zero(), rows: 0 };
+        equations.clear();
+        Ok(equations)
     }
 
     /// Forgets all rows.
     pub fn clear(&mut self) {
-        let n = self.free.len();
-        self.packed[..n * (n + 1) / 2].fill(S::zero());
-        self.gradient[..n].fill(S::zero());
-        self.cost = S::zero();
-        self.weight = S::zero();
-        self.rows = 0;
+        self.packed.fill(S::zero());
+        self.gradient.fill(S::zero());
+        (self.cost, self.prior_cost, self.weight, self.rows) = (S::zero(), S::zero(), S::zero(), 0);
     }
 
-    /// Adds one row of J (over all parameters; the free ones are picked here), its residual in metres and its weight.
-    pub fn add(&mut self, row: &Row<S>, residual_m: S, weight: S) {
-        let n = self.free.len();
-        let mut columns = [S::zero(); MAX_PARAMETERS];
-        for (column, index) in columns.iter_mut().zip(self.free.indices()) {
-            *column = row[index];
-        }
-        let columns = &columns[..n];
-
-        // The hot loop of a fit: n(n+1)/2 multiply-adds, each inner run contiguous so that it vectorises.
-        let mut rest = &mut self.packed[..];
-        for (i, &column) in columns.iter().enumerate() {
+    /// Adds a block of rows, which has one column an unknown; of more or fewer, those that both have.
+    pub fn add(&mut self, rows: &Rows<'_, S>) {
+        // The hot loop of a fit: n(n+1)/2 sums of eight products, each in registers and added to its entry once.
+        let mut rest = &mut *self.packed;
+        for (i, (column, pull)) in rows.columns.iter().zip(self.gradient.iter_mut()).enumerate() {
             let (line, below) = rest.split_at_mut(i + 1);
-            let weighted = weight * column;
-            for (entry, &other) in line.iter_mut().zip(columns) {
-                *entry += weighted * other;
+            let weighted = product(column, rows.weight);
+            for (entry, other) in line.iter_mut().zip(rows.columns) {
+                *entry += sum_of_products(&weighted, other);
             }
+            *pull += sum_of_products(&weighted, rows.residual_m);
             rest = below;
         }
+        let weighted = product(rows.residual_m, rows.weight);
+        self.cost += sum_of_products(&weighted, rows.residual_m);
+        self.weight += sum(rows.weight);
+        self.rows += rows.count;
+    }
 
-        let weighted_residual = weight * residual_m;
-        for (entry, &column) in self.gradient.iter_mut().zip(columns) {
-            *entry += weighted_residual * column;
+    /// Adds what was known before: values that are `deviation = x − x₀` away from where they are believed to be.
+    pub fn add_prior(&mut self, deviation: &[S], precision: Precision<'_, S>) {
+        let at = |i: usize, j: usize| match precision {
+            Precision::Diagonal(diagonal) if i == j => diagonal.get(i).copied().unwrap_or(S::zero()),
+            Precision::Diagonal(_) => S::zero(),
+            Precision::Full(packed) => packed.get(triangle(i.max(j)) + i.min(j)).copied().unwrap_or(S::zero()),
+        };
+        for (i, &own) in deviation.iter().enumerate().take(self.unknowns()) {
+            let pull = deviation.iter().enumerate().fold(S::zero(), |sum, (j, &other)| sum + at(i, j) * other);
+            self.gradient[i] -= pull;
+            self.prior_cost += own * pull;
+            for j in 0..=i {
+                self.packed[triangle(i) + j] += at(i, j);
+            }
         }
-        self.cost += weighted_residual * residual_m;
-        self.weight += weight;
-        self.rows += 1;
     }
 
     /// Adds all rows of `other`, as if they had been added here.
     ///
     /// # Errors
-    /// [`FreeSetMismatch`] when the two are over different parameters; nothing is added then.
-    pub fn merge(&mut self, other: &Self) -> Result<(), FreeSetMismatch> {
-        if self.free != other.free {
-            return Err(FreeSetMismatch);
+    /// [`SizeMismatch`] when the two are over different numbers of unknowns; nothing is added then.
+    pub fn merge(&mut self, other: &NormalEquations<'_, S>) -> Result<(), SizeMismatch> {
+        if self.unknowns() != other.unknowns() {
+            return Err(SizeMismatch);
         }
-        let n = self.free.len();
-        for (entry, &more) in self.packed[..n * (n + 1) / 2].iter_mut().zip(&other.packed) {
+        for (entry, &more) in self.packed.iter_mut().zip(&*other.packed) {
             *entry += more;
         }
-        for (entry, &more) in self.gradient[..n].iter_mut().zip(&other.gradient) {
+        for (entry, &more) in self.gradient.iter_mut().zip(&*other.gradient) {
             *entry += more;
         }
         self.cost += other.cost;
+        self.prior_cost += other.prior_cost;
         self.weight += other.weight;
         self.rows += other.rows;
         Ok(())
     }
 
-    /// The free parameters, in the order of the equations.
-    pub fn free(&self) -> &FreeParameters {
-        &self.free
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.gradient.len()
     }
 
-    /// Entry (i, j) of `JᵀWJ`, counted over the free parameters; `None` beyond them.
+    /// Entry (i, j) of the matrix; `None` beyond the unknowns.
     pub fn entry(&self, i: usize, j: usize) -> Option<S> {
         let (i, j) = (i.max(j), i.min(j));
-        (i < self.free.len()).then(|| self.packed[i * (i + 1) / 2 + j])
+        (i < self.unknowns()).then(|| self.packed[triangle(i) + j])
     }
 
-    /// `JᵀWf`, over the free parameters: half the direction of steepest descent of the cost.
+    /// The right-hand side: half the direction of steepest descent of the cost.
     pub fn gradient(&self) -> &[S] {
-        &self.gradient[..self.free.len()]
+        self.gradient
     }
 
-    /// `Σ w f²`, square metres times the weights' unit (φ in the paper's eq. 4).
+    /// What is minimised: `Σ w f²`, square metres times the weights' unit (φ in the paper's eq. 4), and what the prior adds.
     pub fn cost(&self) -> S {
-        self.cost
+        self.cost + self.prior_cost
+    }
+
+    /// `√(Σ w f² / Σ w)`, metres: of the measurements alone.
+    pub fn rms_m(&self) -> S {
+        (self.cost / self.weight).square_root()
     }
 
     /// `Σ w`.
@@ -207,12 +191,37 @@ impl<S: Real> NormalEquations<S> {
 
     /// The packed lower triangle, by rows.
     pub(crate) fn packed(&self) -> &[S] {
-        let n = self.free.len();
-        &self.packed[..n * (n + 1) / 2]
+        self.packed
     }
 
-    /// The diagonal of `JᵀWJ`: the squared norm of every free column.
-    pub(crate) fn diagonal(&self) -> impl Iterator<Item = S> + '_ {
-        (0..self.free.len()).map(|i| self.packed[i * (i + 1) / 2 + i])
+    /// The diagonal of the matrix: without a prior, the squared norm of every column.
+    pub fn diagonal(&self) -> impl Iterator<Item = S> + '_ {
+        (0..self.unknowns()).map(|i| self.packed[triangle(i) + i])
     }
+}
+
+fn product<S: Real>(a: &Lanes<S>, b: &Lanes<S>) -> Lanes<S> {
+    let mut product = *a;
+    for (value, &factor) in product.iter_mut().zip(b) {
+        *value *= factor;
+    }
+    product
+}
+
+/// In pairs, so that no addition waits for the one before it, and rounding grows with the logarithm.
+fn sum<S: Real>(a: &Lanes<S>) -> S {
+    let mut sums = *a;
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            let other = sums[i + half];
+            sums[i] += other;
+        }
+        half /= 2;
+    }
+    sums[0]
+}
+
+fn sum_of_products<S: Real>(a: &Lanes<S>, b: &Lanes<S>) -> S {
+    sum(&product(a, b))
 }

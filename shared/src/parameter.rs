@@ -57,7 +57,7 @@ impl ParameterKind {
     }
 }
 
-/// The SI unit of a parameter.
+/// The SI unit of a parameter, or of another unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParameterUnit {
@@ -67,6 +67,8 @@ pub enum ParameterUnit {
     Radian,
     /// A ratio.
     One,
+    /// A time.
+    Second,
 }
 
 /// One parameter of a chain: a kind, and the number of its link or joint counted from 1. Written `x1`, `gamma7`, `scale6`.

@@ -3,8 +3,10 @@
 //!
 //! Run with `cargo bench -p ballbar-tests`. Quote ratios: times depend on the machine and what else it does.
 
-use ballbar::{Chain, FreeParameters, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Parameter};
-use ballbar_calib::identify::{Identifiability, LmOptions, solve};
+use ballbar::{
+    Chain, FreeParameters, Kinematics, LANES, LengthRows, MAX_PARAMETERS, Measurement, NormalEquations, Parameter, Quantity,
+};
+use ballbar_calib::identify::{Identifiability, LmOptions, solve_lengths};
 use ballbar_tests::experiment::Puma;
 use criterion::{Criterion, criterion_group, criterion_main};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
@@ -44,7 +46,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for PeerProblem<'_> {
         let mut jacobian = DMatrix::zeros(self.measurements.len(), self.free.len());
         let mut row = [0.0; MAX_PARAMETERS];
         for (i, measurement) in self.measurements.iter().enumerate() {
-            kinematics.residual_row(measurement, &mut row);
+            kinematics.gradient(Quantity::Length, &measurement.q, &measurement.pairing, &mut row);
             for (j, index) in self.free.indices().enumerate() {
                 jacobian[(i, j)] = row[index];
             }
@@ -64,7 +66,7 @@ fn fits(criterion: &mut Criterion) {
     for (count, free) in &sets {
         let problem = PeerProblem { chain: chain.clone(), free, measurements: &measurements };
         let (peer, report) = LevenbergMarquardt::new().minimize(problem.clone());
-        let ours = solve(chain, &measurements, free, &LmOptions::default());
+        let ours = solve_lengths(chain, &measurements, free, &LmOptions::default());
         let rms = |chain: &Chain<f64>| {
             let kinematics = Kinematics::new(chain);
             measurements.iter().map(|m| kinematics.residual(m).powi(2)).sum::<f64>()
@@ -73,7 +75,7 @@ fn fits(criterion: &mut Criterion) {
         assert!((rms(&peer.chain) / rms(&ours.chain) - 1.0).abs() < 1e-6, "both at the minimum");
 
         group.bench_function(format!("host-cal, {count} free"), |bencher| {
-            bencher.iter(|| solve(chain, &measurements, free, &LmOptions::default()));
+            bencher.iter(|| solve_lengths(chain, &measurements, free, &LmOptions::default()));
         });
         group.bench_function(format!("levenberg-marquardt crate, {count} free"), |bencher| {
             bencher.iter(|| LevenbergMarquardt::new().minimize(problem.clone()));
@@ -82,14 +84,16 @@ fn fits(criterion: &mut Criterion) {
     group.finish();
 
     let kinematics = Kinematics::new(chain);
-    let mut row = [0.0; MAX_PARAMETERS];
-    let mut group = criterion.benchmark_group("one pose");
-    group.bench_function("gradient row", |bencher| {
-        bencher.iter(|| kinematics.residual_row(&measurements[0], &mut row));
-    });
+    let mut rows = LengthRows::default();
+    let mut group = criterion.benchmark_group("a block of eight poses");
+    group.bench_function("rows", |bencher| bencher.iter(|| rows.compute(&kinematics, &measurements[..LANES])));
     for (count, free) in &sets {
-        let mut equations = NormalEquations::new(free.clone());
-        group.bench_function(format!("update of {count} columns"), |bencher| bencher.iter(|| equations.add(&row, 1e-3, 1.0)));
+        let mut memory = vec![0.0; NormalEquations::<f64>::memory(free.len())];
+        let mut equations = NormalEquations::new(free.len(), &mut memory).expect("as long as was asked for");
+        let columns: Vec<_> = free.indices().map(|index| *rows.chain(index)).collect();
+        group.bench_function(format!("update of {count} columns"), |bencher| {
+            bencher.iter(|| equations.add(&rows.over(&columns)));
+        });
     }
     group.finish();
     criterion.bench_function("what 810 poses identify", |bencher| {

@@ -17,6 +17,7 @@ mod record;
 use std::path::Path;
 use std::time::Duration;
 
+use ballbar::{Chain, Measurement, Parameter};
 use host_cal::virtual_board::{Driven, Plant, Script};
 use tempfile::TempDir;
 
@@ -97,6 +98,22 @@ impl EmulatedBoard {
     pub fn wait_for_own_resets(&self, count: usize) {
         wait_for(LIMIT, &format!("reset {count} of the board"), || (self.own_resets() >= count).then_some(()));
     }
+}
+
+/// A six-axis robot and measured lengths as `firmware/src/bin/common/loaded.rs` reads them, for the programs that compute on the board. Free
+/// are all parameters but those that move the tool as others do.
+pub fn loaded(chain: &Chain<f64>, measurements: &[Measurement<f64>]) -> Vec<u8> {
+    let free = (0..chain.parameter_count()).filter(|&index| !chain.is_conventionally_held(Parameter::from_index(index)));
+    let bits = |values: &[f64]| -> Vec<u32> { values.iter().map(|&value| (value as f32).to_bits()).collect() };
+    let mut words = bits(chain.parameters());
+    words.extend(free.map(|index| index as u32));
+    words.push(measurements.len() as u32);
+    for Measurement { pairing, q, length_m, .. } in measurements {
+        words.extend(bits(&q.as_array()[..chain.joints()]));
+        words.extend([pairing.chuck_base_m, pairing.sphere_tool_m].iter().flat_map(|end| bits(end.as_slice())));
+        words.extend(bits(&[*length_m]));
+    }
+    words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
 /// What a program of the emulated board prints on the link, up to a line `end`; `memory` stands at 0x21000000 beforehand.

@@ -19,6 +19,8 @@ pub enum Image {
     An386,
     /// The counter of instructions.
     An386Counts,
+    /// The fit in single precision.
+    An386Fit,
 }
 
 impl Image {
@@ -30,10 +32,12 @@ impl Image {
         static F405: LazyLock<PathBuf> = LazyLock::new(|| build("f405", "f405"));
         static AN386: LazyLock<PathBuf> = LazyLock::new(|| build("an386", "an386"));
         static AN386_COUNTS: LazyLock<PathBuf> = LazyLock::new(|| build("an386-counts", "an386"));
+        static AN386_FIT: LazyLock<PathBuf> = LazyLock::new(|| build("an386-fit", "an386"));
         match self {
             Self::F405 => &F405,
             Self::An386 => &AN386,
             Self::An386Counts => &AN386_COUNTS,
+            Self::An386Fit => &AN386_FIT,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The firmware images as they are flashed, on emulated boards.
 
+mod board_fit;
 mod emulated_board;
 mod image_sizes;
 mod instruction_counts;

@@ -2,9 +2,9 @@
 //! SciPy's least squares for the fit.
 
 use ballbar::{
-    Chain, Damping, FreeParameters, JointKind, Kinematics, MAX_PARAMETERS, Matrix3, Measurement, Pairing, Real, Vector3,
+    Chain, Damping, FreeParameters, JointKind, Kinematics, MAX_PARAMETERS, Matrix3, Measurement, Pairing, Quantity, Real, Vector3,
 };
-use ballbar_calib::identify::{LmOptions, Observation, Solution, Spectrum, Uncertainty, solve};
+use ballbar_calib::identify::{LmOptions, Observation, Solution, Spectrum, Uncertainty, solve_lengths};
 use ballbar_tests::data::golden;
 use serde::Deserialize;
 
@@ -87,7 +87,7 @@ fn worst_of_pose<S: Real>(chain: &Chain<f64>, pose: &CasePose) -> f64 {
     });
 
     let mut gradient = [S::zero(); MAX_PARAMETERS];
-    let length_with_gradient = kinematics.length_gradient(&q, &pairing, &mut gradient);
+    let length_with_gradient = kinematics.gradient(Quantity::Length, &q, &pairing, &mut gradient).value_m;
     assert_eq!(pose.gradient.len(), chain.parameter_count());
     let of_gradient = gradient.iter().zip(&pose.gradient).map(|(a, &b)| (a.widen(), b));
     let lengths = [kinematics.length(&q, &pairing), length_with_gradient].map(|length| (length.widen(), pose.length_m));
@@ -147,7 +147,7 @@ impl FitProblem {
     }
 
     fn solve(&self, free: &FreeParameters, damping: Damping) -> Solution {
-        let solution = solve(&self.chain, &self.measurements, free, &LmOptions { damping, ..LmOptions::default() });
+        let solution = solve_lengths(&self.chain, &self.measurements, free, &LmOptions { damping, ..LmOptions::default() });
         assert!(solution.status.is_minimum(), "{damping:?} ended as {:?}", solution.status);
         solution
     }
@@ -180,7 +180,8 @@ fn standard_deviations_and_condition_are_those_of_the_reference() {
     let problem = FitProblem::load();
     for damping in DAMPINGS {
         let fitted = problem.solve(&problem.free, damping).chain;
-        let uncertainty = Uncertainty::new(&fitted, &problem.measurements, &problem.free);
+        let free: Vec<usize> = problem.free.indices().collect();
+        let uncertainty = Uncertainty::new(&Observation::new(&fitted, &problem.measurements), &free);
         assert_eq!(uncertainty.std.len(), problem.file.std.len());
         for (i, (found, &expected)) in uncertainty.std.iter().zip(&problem.file.std).enumerate() {
             assert_close(&format!("deviation {i}"), found.unwrap(), expected, 1e-7 * expected);

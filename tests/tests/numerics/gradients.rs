@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use ballbar::{Chain, JointKind, JointVector, Kinematics, MAX_PARAMETERS, Matrix3, Measurement, Pairing, Vector3};
+use ballbar::{Chain, JointKind, JointVector, Kinematics, MAX_PARAMETERS, Matrix3, Measurement, Pairing, Quantity, Vector3};
 use ballbar_tests::naive;
 use nalgebra::Vector4;
 use num_complex::Complex;
@@ -114,14 +114,14 @@ proptest! {
         // The bar's direction is known to rounding over its length, for both.
         prop_assume!(expected_m > 0.05);
         let mut row = [UNTOUCHED; MAX_PARAMETERS];
-        let length_m = kinematics.length_gradient(&arm.q(), &pairing, &mut row);
+        let length_m = kinematics.gradient(Quantity::Length, &arm.q(), &pairing, &mut row).value_m;
         prop_assert!((length_m - expected_m).abs() <= 1e-13 * expected_m.max(1.0), "{length_m} beside {expected_m}");
         prop_assert_eq!(length_m, kinematics.length(&arm.q(), &pairing));
         assert_row(&row, &expected)?;
     }
 
     #[test]
-    fn wrench_columns_of_unit_forces_are_the_gradient_of_the_points_coordinates(arm in arms(), point_tool_m in points(0.3)) {
+    fn the_gradient_of_a_position_is_that_of_complex_steps(arm in arms(), point_tool_m in points(0.3)) {
         const STEP: f64 = 1e-100;
         let kinematics = Kinematics::new(&arm.chain);
         let point_m = kinematics.point_in_base(&arm.q(), &point_tool_m);
@@ -131,11 +131,11 @@ proptest! {
             stepped[i].im = STEP;
             naive_point(&arm, &stepped, point_tool_m).map(|c| c.im / STEP)
         }).collect();
-        for axis in 0..3 {
-            let force = Vector3::ith(axis, 1.0);
-            let mut row = [UNTOUCHED; MAX_PARAMETERS];
-            kinematics.wrench_columns(&arm.q(), force, point_m.cross(&force), &mut row);
-            assert_row(&row, &derivatives.iter().map(|derivative| derivative[axis]).collect::<Vec<_>>())?;
+        let mut rows = [[UNTOUCHED; MAX_PARAMETERS]; 3];
+        let found_m = kinematics.position_gradient(&arm.q(), &point_tool_m, &mut rows);
+        prop_assert!((found_m - point_m).amax() <= 1e-13);
+        for (axis, row) in rows.iter().enumerate() {
+            assert_row(row, &derivatives.iter().map(|derivative| derivative[axis]).collect::<Vec<_>>())?;
         }
     }
 
@@ -144,11 +144,11 @@ proptest! {
         let kinematics = Kinematics::new(&arm.chain);
         let measurement = Measurement { pairing, q: arm.q(), length_m, weight: 1.0 };
         let mut row = [UNTOUCHED; MAX_PARAMETERS];
-        let residual_m = kinematics.residual_row(&measurement, &mut row);
+        let (residual_m, _) = kinematics.residual_row(&measurement, &mut row);
         prop_assert_eq!(residual_m, length_m - kinematics.length(&arm.q(), &pairing));
         prop_assert_eq!(residual_m, kinematics.residual(&measurement));
         let mut gradient = [UNTOUCHED; MAX_PARAMETERS];
-        kinematics.length_gradient(&arm.q(), &pairing, &mut gradient);
+        kinematics.gradient(Quantity::Length, &arm.q(), &pairing, &mut gradient);
         prop_assert_eq!(row, gradient, "the row is the gradient of the computed length, not of the residual");
     }
 
@@ -160,7 +160,7 @@ proptest! {
             let (mut cost, mut descent, mut size) = (0.0, [0.0; MAX_PARAMETERS], 0.0);
             for measurement in measurements {
                 let mut row = [0.0; MAX_PARAMETERS];
-                let residual_m = kinematics.residual_row(measurement, &mut row);
+                let (residual_m, _) = kinematics.residual_row(measurement, &mut row);
                 cost += residual_m * residual_m;
                 descent.iter_mut().zip(&row).for_each(|(sum, column)| *sum += residual_m * column);
                 size += row.iter().map(|column| column * column).sum::<f64>();
@@ -181,7 +181,7 @@ proptest! {
         let t = 1e-5 / size;
         step.iter_mut().for_each(|g| *g *= t);
         let mut stepped = arm.chain.clone();
-        stepped.apply(&step);
+        stepped.parameters_mut().iter_mut().zip(&step).for_each(|(value, by)| *value += by);
         let (after, ..) = cost_and_descent(&stepped, &measurements);
         let gain = (before - after) / (2.0 * t * slope);
         prop_assert!((gain - 1.0).abs() < 1e-3, "{gain} of what the gradient promises");
@@ -192,7 +192,8 @@ proptest! {
         let kinematics = Kinematics::new(&arm.chain);
         let chuck_base_m = kinematics.point_in_base(&arm.q(), &sphere_tool_m);
         let mut row = [UNTOUCHED; MAX_PARAMETERS];
-        let length_m = kinematics.length_gradient(&arm.q(), &Pairing { chuck_base_m, sphere_tool_m }, &mut row);
+        let pairing = Pairing { chuck_base_m, sphere_tool_m };
+        let length_m = kinematics.gradient(Quantity::Length, &arm.q(), &pairing, &mut row).value_m;
         prop_assert_eq!(length_m, 0.0);
         // Compares equal to zero with either sign, and a NaN with nothing.
         assert_row(&row, &vec![0.0; arm.chain.parameter_count()])?;

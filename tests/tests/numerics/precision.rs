@@ -2,10 +2,10 @@
 //! joint values in both precisions, so that the encoders' own resolution stays out of it. And a fit.
 
 use ballbar::{
-    Chain, DampedSolver, Damping, FreeParameters, JointVector, Kinematics, MAX_PARAMETERS, Measurement, NormalEquations, Pairing,
-    Parameter, ParameterKind, Real, Vector3,
+    Chain, Damping, FreeParameters, JointVector, Kinematics, LANES, Lanes, LengthRows, Lengths, LmOptions, MAX_PARAMETERS,
+    Measurement, NormalEquations, Pairing, Parameter, ParameterKind, Problem, Quantity, Rows, Vector3, lm_memory, minimise,
 };
-use ballbar_calib::identify::{LmOptions, solve};
+use ballbar_calib::identify::solve_lengths;
 use ballbar_calib::model::Robot;
 use ballbar_calib::simulate::Shells;
 use host_cal::files::{open_rig, open_robot};
@@ -95,8 +95,8 @@ fn lengths_and_gradient_rows_in_f32_are_close_to_those_in_f64() {
             for pairing in rig.all_pairings().into_iter().map(|id| rig.pairing(id)) {
                 let rounded = Pairing { chuck_base_m: pairing.chuck_base_m.cast(), sphere_tool_m: pairing.sphere_tool_m.cast() };
                 let (mut exact_row, mut rounded_row) = ([0.0; MAX_PARAMETERS], [0.0_f32; MAX_PARAMETERS]);
-                let exact_m = both.f64.length_gradient(&q64, &pairing, &mut exact_row);
-                let rounded_m = both.f32.length_gradient(&q32, &rounded, &mut rounded_row);
+                let exact_m = both.f64.gradient(Quantity::Length, &q64, &pairing, &mut exact_row).value_m;
+                let rounded_m = both.f32.gradient(Quantity::Length, &q32, &rounded, &mut rounded_row).value_m;
                 if exact_m < SHORTEST_M {
                     continue;
                 }
@@ -114,40 +114,54 @@ fn lengths_and_gradient_rows_in_f32_are_close_to_those_in_f64() {
     }
 }
 
-/// A plain Levenberg-Marquardt fit whose equations and steps are in `f32`, its kinematics and parameters in `K`.
-fn fit_with_f32_equations<K: Real>(design: &Chain<f64>, measurements: &[Measurement<f64>], free: &FreeParameters) -> Chain<f64> {
-    let cast = |point: Vector3<f64>| point.map(K::nearest);
-    let evaluate = |chain: &Chain<K>| {
+/// Lengths computed in `f64`, equations and steps in `f32`.
+struct ExactLengths<'a> {
+    measurements: &'a [Measurement<f64>],
+    free: &'a FreeParameters,
+}
+
+impl Problem<f32> for ExactLengths<'_> {
+    type Values = Chain<f64>;
+
+    fn unknowns(&self) -> usize {
+        self.free.len()
+    }
+
+    fn add_to(&self, chain: &Chain<f64>, equations: &mut NormalEquations<'_, f32>) {
         let kinematics = Kinematics::new(chain);
-        let mut equations = NormalEquations::<f32>::new(free.clone());
-        let mut row = [K::zero(); MAX_PARAMETERS];
-        for Measurement { pairing: Pairing { chuck_base_m, sphere_tool_m }, q, length_m, weight } in measurements {
-            let pairing = Pairing { chuck_base_m: cast(*chuck_base_m), sphere_tool_m: cast(*sphere_tool_m) };
-            let measurement = Measurement { pairing, q: q.cast(), length_m: K::nearest(*length_m), weight: K::nearest(*weight) };
-            let residual_m = kinematics.residual_row(&measurement, &mut row);
-            equations.add(&row.map(|column| column.widen() as f32), residual_m.widen() as f32, 1.0);
-        }
-        equations
-    };
-    let mut chain = design.cast::<K>();
-    let mut equations = evaluate(&chain);
-    let mut lambda = 1e-6_f32;
-    for _ in 0..30 {
-        let largest = (0..free.len()).filter_map(|i| equations.entry(i, i)).fold(0.0, f32::max);
-        let Ok(step) = DampedSolver::default().solve(&equations, lambda * largest, Damping::Identity) else {
-            lambda *= 10.0;
-            continue;
-        };
-        let mut candidate = chain.clone();
-        candidate.apply(&step.change.map(|change| K::nearest(f64::from(change))));
-        let trial = evaluate(&candidate);
-        if trial.cost() < equations.cost() {
-            (chain, equations, lambda) = (candidate, trial, (lambda / 10.0).max(1e-7));
-        } else {
-            lambda *= 10.0;
+        let mut exact = LengthRows::default();
+        for block in self.measurements.chunks(LANES) {
+            exact.compute(&kinematics, block);
+            let rounded = |lanes: &Lanes<f64>| lanes.map(|value| value as f32);
+            let columns: Vec<_> = self.free.indices().map(|index| rounded(exact.chain(index))).collect();
+            let rows = exact.over(&[]);
+            let (residual_m, weight) = (rounded(rows.residual_m), rounded(rows.weight));
+            equations.add(&Rows { columns: &columns, residual_m: &residual_m, weight: &weight, count: rows.count });
         }
     }
-    chain.cast()
+
+    fn moved(&self, chain: &Chain<f64>, change: &[f32]) -> Chain<f64> {
+        let mut moved = chain.clone();
+        for (index, &by) in self.free.indices().zip(change) {
+            moved.parameters_mut()[index] += f64::from(by);
+        }
+        moved
+    }
+}
+
+fn minimum_of<P: Problem<f32>>(problem: &P, start: P::Values) -> P::Values {
+    let mut memory = vec![0.0; lm_memory::<f32>(problem.unknowns())];
+    let options = LmOptions { damping: Damping::Diagonal, ..LmOptions::default() };
+    let minimum = minimise(problem, start, &options, &mut memory, |_| ()).unwrap();
+    assert!(minimum.status.is_minimum(), "{:?}", minimum.status);
+    println!("{:?} after {} steps", minimum.status, minimum.steps);
+    minimum.values
+}
+
+fn in_f32(measurement: &Measurement<f64>) -> Measurement<f32> {
+    let Measurement { pairing: Pairing { chuck_base_m, sphere_tool_m }, q, length_m, weight } = measurement;
+    let pairing = Pairing { chuck_base_m: chuck_base_m.cast(), sphere_tool_m: sphere_tool_m.cast() };
+    Measurement { pairing, q: q.cast(), length_m: *length_m as f32, weight: *weight as f32 }
 }
 
 /// The same minimum, seen by what it predicts: each of the 810 lengths beside the one that the `f64` optimum gives.
@@ -178,11 +192,12 @@ fn a_fit_with_f32_equations_ends_at_the_optimum() {
         measurements.iter().map(|measurement| kinematics.residual(measurement) * 1e3).collect()
     };
     let rms = |residuals: &[f64]| (residuals.iter().map(|f| f * f).sum::<f64>() / residuals.len() as f64).sqrt();
-    let optimum = residuals_mm(&solve(&design.chain, &measurements, &free, &LmOptions::default()).chain);
+    let optimum = residuals_mm(&solve_lengths(&design.chain, &measurements, &free, &LmOptions::default()).chain);
     assert!((0.075..0.090).contains(&rms(&optimum)), "{} mm", rms(&optimum));
 
-    let equations = fit_with_f32_equations::<f64>(&design.chain, &measurements, &free);
-    let everything = fit_with_f32_equations::<f32>(&design.chain, &measurements, &free);
+    let equations = minimum_of(&ExactLengths { measurements: &measurements, free: &free }, design.chain.clone());
+    let rounded: Vec<_> = measurements.iter().map(in_f32).collect();
+    let everything = minimum_of(&Lengths { measurements: rounded.iter().copied(), free: &free }, design.chain.cast()).cast();
     for (what, chain, length_mm, rms_mm) in [("equations", equations, 2e-6, 1e-10), ("everything", everything, 4e-4, 1e-6)] {
         let found = residuals_mm(&chain);
         let worst = found.iter().zip(&optimum).map(|(a, b)| (a - b).abs()).fold(0.0, worse);
