@@ -75,6 +75,7 @@ fn plausible_deviation(unit: ParameterUnit) -> f64 {
         ParameterUnit::Metre => 5e-3 / 3.0,
         ParameterUnit::Radian => 0.5_f64.to_radians() / 3.0,
         ParameterUnit::One => 0.5e-2 / 3.0,
+        ParameterUnit::Second => unreachable!("no parameter of a chain is a time"),
     }
 }
 

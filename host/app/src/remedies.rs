@@ -12,6 +12,7 @@ use ballbar_calib::kinematics::NothingAllowed;
 use ballbar_calib::plan::{Cause, FixturesOverlap, PlanError};
 use ballbar_calib::simulate::ShellError;
 use ballbar_calib::units::mm_from_m;
+use ballbar_calib::unknowns::{Kind, UnknownError};
 use miette::Diagnostic;
 
 /// An error of the library with the command's words. What has no [`Remedy`] cannot be shown.
@@ -66,6 +67,32 @@ impl Remedy for FitError {
         let words = match self {
             Self::NoRedundancy { .. } => "Measure more poses (the paper took some 800), or hold more parameters with --hold.",
             Self::NoSuchParameter(_) => "A robot of J joints has x1 … gamma1, offset1, scale1 up to gamma(J+1).",
+        };
+        Some(words.into())
+    }
+}
+
+impl Remedy for UnknownError {
+    fn words(&self) -> Option<String> {
+        let (kind, why) = match self {
+            Self::NoTolerance => (Kind::Rig, "no chuck or sphere that was measured with has a `tolerance_mm` above zero"),
+            Self::NoRods => (Kind::BarGain, "neither rig nor poses say how long the bar is at mid travel"),
+            Self::NoMotion => (Kind::Latency, "no length was measured in motion"),
+            Self::NoSets => (Kind::Sets, "no pose names a set"),
+            _ => return None,
+        };
+        Some(format!("--unknown {}: {why}", kind.name()))
+    }
+
+    fn remedy(&self) -> Option<Cow<'static, str>> {
+        let words = match self {
+            Self::NoTolerance => {
+                "Say in rig.toml how well the centres are known: `tolerance_mm` of a chuck or sphere, or once at the top for all."
+            }
+            Self::NoRods => "Give the rig a [bar] with `lengths_mm`, or the poses a column `bar_mm`.",
+            Self::NoMotion => "Only poses that `host-cal collect` measures on the way tell it.",
+            Self::NoSets => "Give the poses a column `set`.",
+            _ => return None,
         };
         Some(words.into())
     }

@@ -7,7 +7,7 @@ use std::error::Error;
 
 use ballbar_calib::assess::{Assessment, Evidence};
 use ballbar_calib::designs;
-use ballbar_calib::identify::{FitOptions, fit};
+use ballbar_calib::identify::{FitOptions, explanation, fit};
 use ballbar_calib::model::{Dataset, PairingId, PoseRow, Rig, Robot};
 use ballbar_calib::simulate::Shells;
 use ballbar_calib::units::mm_from_m;
@@ -48,7 +48,7 @@ fn assess(design: &Robot, rig: &Rig, dataset: &Dataset, unseen: &Dataset) -> Res
     let fit = fit(design, dataset, &FitOptions::default())?;
     let unseen = [("the longer bar".to_owned(), unseen)];
     let assessment = Assessment::new(&Evidence { unseen: &unseen, ..Evidence::new(design, rig, dataset, &fit) });
-    println!("{} ({}).", assessment.answer.words(), fit.solution.status.explanation());
+    println!("{} ({}).", assessment.answer.words(), explanation(fit.solution.status));
     for proof in &assessment.proofs {
         let [before_mm, after_mm] = [proof.before_summary(), proof.after_summary()].map(|summary| mm_from_m(summary.rms_m));
         println!("  on {}: {before_mm:.3} mm by the design, {after_mm:.3} mm by the fit", proof.name);

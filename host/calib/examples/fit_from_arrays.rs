@@ -33,8 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let unit = ScreenUnit::from(fitted.unit);
         let shown = |value: f64| fixed(unit.from_si(value), 4);
         let std = fitted.std.map_or("?".to_owned(), shown);
-        let name = fitted.parameter.to_string();
-        println!("{name:9} {:>10} {:>12} {std:>12} {}", shown(fitted.initial), shown(fitted.fitted), unit.name());
+        println!("{:9} {:>10} {:>12} {std:>12} {}", fitted.name, shown(fitted.initial), shown(fitted.fitted), unit.name());
     }
     Ok(())
 }

@@ -5,10 +5,11 @@
 
 use std::error::Error;
 
-use ballbar_calib::identify::{FitOptions, fit, plausible_error};
+use ballbar_calib::identify::{FitOptions, fit};
 use ballbar_calib::model::{Dataset, Robot};
 use ballbar_calib::simulate::{Shells, tool_error};
 use ballbar_calib::units::mm_from_m;
+use ballbar_calib::unknowns::plausible_error;
 use ballbar_calib::{Chain, Parameter, designs};
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -27,15 +27,18 @@ pub enum ScreenUnit {
     Degree,
     /// Ratios stay as they are.
     One,
+    /// Milliseconds, for seconds.
+    Millisecond,
 }
 
 impl ScreenUnit {
-    /// Its short name: `mm`, `deg`, `1`.
+    /// Its short name: `mm`, `deg`, `1`, `ms`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Millimetre => "mm",
             Self::Degree => "deg",
             Self::One => "1",
+            Self::Millisecond => "ms",
         }
     }
 
@@ -45,6 +48,7 @@ impl ScreenUnit {
             Self::Millimetre => mm_from_m(value),
             Self::Degree => value.to_degrees(),
             Self::One => value,
+            Self::Millisecond => value * 1e3,
         }
     }
 
@@ -54,6 +58,7 @@ impl ScreenUnit {
             Self::Millimetre => m_from_mm(value),
             Self::Degree => value.to_radians(),
             Self::One => value,
+            Self::Millisecond => value / 1e3,
         }
     }
 }
@@ -64,6 +69,7 @@ impl From<ParameterUnit> for ScreenUnit {
             ParameterUnit::Metre => Self::Millimetre,
             ParameterUnit::Radian => Self::Degree,
             ParameterUnit::One => Self::One,
+            ParameterUnit::Second => Self::Millisecond,
         }
     }
 }

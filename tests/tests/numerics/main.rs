@@ -13,3 +13,4 @@ mod real_data;
 mod report_proofs;
 mod robots;
 mod stored;
+mod unknowns;

@@ -29,7 +29,7 @@ fn a_fit_and_its_assessment_come_back() {
     let (written, read): (_, Fit) = to_and_fro(&result);
     assert_eq!(read.solution.chain, result.solution.chain);
     assert_eq!(read.uncertainty.covariance, result.uncertainty.covariance);
-    assert_eq!(written["parameters"][0]["parameter"], "x1");
+    assert_eq!(written["parameters"][0]["name"], "x1");
     assert_eq!(written["parameters"][6]["held"], json!({ "finding": { "redundant": { "with": ["alpha1"] } } }));
     assert_eq!(written["identifiability"]["findings"][0], "identified");
     assert_eq!(written["solution"]["chain"]["parameters"].as_array().unwrap().len(), 54);

@@ -25,7 +25,7 @@ fn pool(puma: &Puma) -> Pool {
     let subset = Expectation::new(&puma.design.chain, &measurements, &puma.design.limits).identified;
     let cell = Cell::new(&puma.design, &puma.rig, 0.075, Margins::default(), Pace::default()).unwrap();
     let row = |pose: &PoseRow| {
-        let row = cell.plausible_row(&pose.measurement.q, &pose.measurement.pairing);
+        let row = cell.plausible_rows(&[pose.measurement.q], &pose.measurement.pairing).remove(0);
         subset.iter().map(|&column| row[column]).collect()
     };
     Pool { rows: poses.iter().map(row).collect(), poses, subset }

@@ -4,7 +4,7 @@ use std::fs;
 
 use ballbar::{FreeParameters, Kinematics};
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
-use ballbar_calib::identify::{Fit, FitOptions, LmOptions, fit, solve};
+use ballbar_calib::identify::{Fit, FitOptions, LmOptions, fit, solve_lengths};
 use ballbar_calib::model::Dataset;
 use ballbar_calib::simulate::tool_error;
 use ballbar_tests::command::host_cal_in;
@@ -173,8 +173,8 @@ fn left_out_residuals_are_those_of_a_fit_without_them() {
     // Every pose is a posture of its own here, so that rows take turns.
     let (left_out, kept): (Vec<usize>, Vec<usize>) = (0..dataset.rows.len()).partition(|row| row % folds == 0);
     let kept: Vec<_> = kept.into_iter().map(|row| dataset.rows[row].measurement).collect();
-    let free = FreeParameters::filtered(fit.parameters.len(), |index| fit.parameters[index].held.is_none());
-    let without = solve(&puma.design.chain, &kept, &free, &LmOptions::default());
+    let free = FreeParameters::from_indices((0..54).filter(|&index| fit.parameters[index].held.is_none())).unwrap();
+    let without = solve_lengths(&puma.design.chain, &kept, &free, &LmOptions::default());
     let (design, refitted) = (Kinematics::new(&puma.design.chain), Kinematics::new(&without.chain));
     for row in left_out {
         let measurement = &dataset.rows[row].measurement;

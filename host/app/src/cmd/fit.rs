@@ -13,6 +13,7 @@ use super::hold::parse_hold;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, largest_text, print, write_calibrated};
+use super::unknowns::UnknownArgs;
 use crate::documents::{FitDocument, Fitted, HeldOutRows, ParameterLine};
 use crate::remedies::Remedied;
 use crate::terminal::table::{Columns, fixed};
@@ -42,6 +43,8 @@ pub(super) struct FitArgs {
     /// Parameters to leave at their design values: auto, paper, none, and names
     #[arg(long, default_value = "auto", value_name = "RULE|NAME,…")]
     hold: String,
+    #[command(flatten)]
+    unknowns: UnknownArgs,
     /// What damps the steps: the identity as in the paper, or the diagonal of the normal matrix
     #[arg(long, value_enum, default_value_t = DampingArg::Identity)]
     damping: DampingArg,
@@ -82,7 +85,8 @@ impl FitArgs {
         check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
         let Measured { robot, rig, dataset, .. } = &measured;
-        let fit = fit(robot, dataset, &FitOptions { hold, damping }).map_err(Remedied)?;
+        let unknowns = self.unknowns.blocks(rig, dataset)?;
+        let fit = fit(robot, dataset, &FitOptions { hold, damping, unknowns }).map_err(Remedied)?;
         let unseen: Vec<(String, &Dataset)> = measured.unseen().into_iter().collect();
         let evidence = Evidence { robot, rig, dataset, fit: &fit, unseen: &unseen, max_rms_m: self.max_rms_mm.map(m_from_mm) };
         let assessment = Assessment::new(&evidence);

@@ -39,6 +39,7 @@ mod status;
 mod stream;
 #[cfg(not(unix))]
 mod unix_only;
+mod unknowns;
 mod validate;
 #[cfg(unix)]
 mod virtual_board;

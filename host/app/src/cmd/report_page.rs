@@ -14,6 +14,7 @@ use super::hold::parse_hold;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_files};
+use super::unknowns::UnknownArgs;
 use crate::files::{FileKind, Output, read_poses};
 use crate::remedies::Remedied;
 use crate::report::{Facts, Figure, Inputs, figures, html, parameters_table};
@@ -38,6 +39,8 @@ pub(super) struct ReportArgs {
     /// Parameters to leave at their design values, as `fit` takes them
     #[arg(long, default_value = "auto", value_name = "RULE|NAME,…")]
     hold: String,
+    #[command(flatten)]
+    unknowns: UnknownArgs,
     /// The largest RMS residual that is believed, as `fit` takes it
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     max_rms_mm: Option<f64>,
@@ -111,7 +114,9 @@ impl ReportArgs {
         let others = self.others(&measured)?;
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;
-        let fit = fit(&measured.robot, &measured.dataset, &FitOptions { hold, ..FitOptions::default() }).map_err(Remedied)?;
+        let unknowns = self.unknowns.blocks(&measured.rig, &measured.dataset)?;
+        let fit =
+            fit(&measured.robot, &measured.dataset, &FitOptions { hold, unknowns, ..FitOptions::default() }).map_err(Remedied)?;
 
         let remarks = remarks(&measured.robot.chain, &measured.dataset, &measured.rig, &measured.robot.limits);
         let unseen: Vec<(String, &Dataset)> =

@@ -2,7 +2,7 @@
 
 use ballbar_calib::assess::{Answer, Assessment, Refusal};
 use ballbar_calib::identify::{
-    ConvergenceTest, Fit, FitRemark, FittedParameter, Outlier, OutlierTest, PairingResiduals, Status, remarks,
+    ConvergenceTest, Fit, FitRemark, FittedParameter, Outlier, OutlierTest, PairingResiduals, Status, explanation, remarks,
 };
 use ballbar_calib::model::{Dataset, Rig, Robot};
 use serde::Serialize;
@@ -166,7 +166,7 @@ impl FitDocument {
     /// Of a fit that was not written.
     pub fn new(fitted: &Fitted<'_>) -> Self {
         let Fitted { robot, rig, dataset, held_out, warnings, fit, assessment } = *fitted;
-        let held_out_rows = held_out.map(|(rule, rows)| HeldOutRows::new(rule, rows, robot, &fit.solution.chain));
+        let held_out_rows = held_out.map(|(rule, rows)| HeldOutRows::new(rule, rows, robot, fit));
         let test = match fit.solution.status {
             Status::Converged(ConvergenceTest::Gradient) => Some("gradient"),
             Status::Converged(ConvergenceTest::Cost) => Some("cost"),
@@ -178,10 +178,10 @@ impl FitDocument {
             robot: robot.name.clone(),
             status: fit.solution.status.name(),
             test,
-            explanation: fit.solution.status.explanation(),
+            explanation: explanation(fit.solution.status),
             rank: fit.identifiability.spectrum.rank,
             parameters_total: fit.parameters.len(),
-            independent_expected: robot.chain.independent_parameters(),
+            independent_expected: fit.unknowns.independent(),
             free_parameters: fit.free_parameters(),
             iterations: fit.solution.steps(),
             poses: dataset.rows.len(),
@@ -220,7 +220,7 @@ impl ParameterLine {
         let unit = ScreenUnit::from(parameter.unit);
         let (initial, fitted) = (unit.from_si(parameter.initial), unit.from_si(parameter.fitted));
         Self {
-            name: parameter.parameter.to_string(),
+            name: parameter.name.clone(),
             unit: unit.name(),
             initial,
             fitted,

@@ -1,7 +1,6 @@
 //! Lines that several documents have in common.
 
-use ballbar::Chain;
-use ballbar_calib::identify::{Finding, Identifiability, PairingResiduals, Residual, ResidualSummary, residuals};
+use ballbar_calib::identify::{Finding, Fit, Identifiability, PairingResiduals, Residual, ResidualSummary, residuals};
 use ballbar_calib::model::{Dataset, Rig, Robot};
 use serde::Serialize;
 
@@ -77,11 +76,8 @@ pub struct NotIdentified {
 impl NotIdentified {
     /// All of them.
     pub fn all(found: &Identifiability) -> Vec<Self> {
-        let line = |(parameter, finding): (ballbar::Parameter, &Finding)| Self {
-            name: parameter.to_string(),
-            kind: finding.kind(),
-            why: finding.to_string(),
-        };
+        let line =
+            |(name, finding): (&str, &Finding)| Self { name: name.to_owned(), kind: finding.kind(), why: finding.to_string() };
         found.not_identified().map(line).collect()
     }
 }
@@ -104,10 +100,10 @@ pub struct HeldOutRows {
 }
 
 impl HeldOutRows {
-    /// With a rule in words, and the parameters before and after.
-    pub fn new(rule: &str, rows: &Dataset, design: &Robot, fitted: &Chain<f64>) -> Self {
-        let summary = |chain| ResidualSummary::new(&residuals(chain, rows));
-        let (initial, after) = (summary(&design.chain), summary(fitted));
+    /// With a rule in words, of a design and a fit.
+    pub fn new(rule: &str, rows: &Dataset, design: &Robot, fit: &Fit) -> Self {
+        let initial = ResidualSummary::new(&residuals(&design.chain, rows));
+        let after = ResidualSummary::new(&fit.residuals_of(rows));
         Self {
             rule: rule.to_owned(),
             poses: after.count,

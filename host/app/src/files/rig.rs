@@ -15,6 +15,8 @@ use crate::units::m_from_mm;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RigToml {
+    /// Of all chucks and spheres that say nothing else.
+    tolerance_mm: Option<Spanned<f64>>,
     chucks: Vec<PointToml>,
     spheres: Vec<PointToml>,
     bar: Option<BarToml>,
@@ -27,6 +29,7 @@ struct RigToml {
 struct PointToml {
     name: Spanned<String>,
     position_mm: Spanned<Vec<Spanned<f64>>>,
+    tolerance_mm: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -50,15 +53,21 @@ pub fn open_rig(argument: &str) -> Result<Rig, InputError> {
 /// As [`open_rig`].
 pub fn parse_rig(source: &Source) -> Result<Rig, InputError> {
     let file: RigToml = deserialize(source)?;
+    let tolerance_m = tolerance_m(source, file.tolerance_mm.as_ref())?;
     Ok(Rig {
-        chucks: points(source, "chuck", &file.chucks)?,
-        spheres: points(source, "sphere", &file.spheres)?,
+        chucks: points(source, "chuck", &file.chucks, tolerance_m)?,
+        spheres: points(source, "sphere", &file.spheres, tolerance_m)?,
         bar: file.bar.map(|bar| read_bar(source, &bar)).transpose()?,
         solids: file.solids.read(source)?,
     })
 }
 
-fn points(source: &Source, what: &'static str, points: &[PointToml]) -> Result<Vec<NamedPoint>, InputError> {
+fn points(
+    source: &Source,
+    what: &'static str,
+    points: &[PointToml],
+    usual_tolerance_m: Option<f64>,
+) -> Result<Vec<NamedPoint>, InputError> {
     if points.is_empty() {
         return Err(InputError::of_file(source.name(), Problem::Empty(what)));
     }
@@ -74,9 +83,14 @@ fn points(source: &Source, what: &'static str, points: &[PointToml]) -> Result<V
             return refuse(Problem::Duplicate { what, name: name.clone() });
         }
         let position_m = Vector3::from(vector(source, "position_mm", &point.position_mm)?.map(m_from_mm));
-        named.push(NamedPoint { name: name.clone(), position_m });
+        let tolerance_m = tolerance_m(source, point.tolerance_mm.as_ref())?.or(usual_tolerance_m);
+        named.push(NamedPoint { name: name.clone(), position_m, tolerance_m });
     }
     Ok(named)
+}
+
+fn tolerance_m(source: &Source, tolerance_mm: Option<&Spanned<f64>>) -> Result<Option<f64>, InputError> {
+    tolerance_mm.map(|mm| in_range(source, "tolerance_mm", mm, Range::Tolerance).map(m_from_mm)).transpose()
 }
 
 /// Every chuck is paired with every sphere, and every length with both: what is searched and told grows with their product.

@@ -2,8 +2,8 @@
 
 use ballbar::{Measurement, Parameter, ParameterUnit, Vector3};
 use ballbar_calib::identify::{
-    AndersonDarling, Fit, FitError, FitOptions, Hold, Observation, Residual, ResidualSummary, Spectrum, anderson_darling, fit,
-    residuals,
+    AndersonDarling, Fit, FitError, FitOptions, FittedParameter, Hold, Observation, Residual, ResidualSummary, Spectrum,
+    anderson_darling, fit, residuals,
 };
 use ballbar_calib::model::{Dataset, PoseRow, Robot};
 use ballbar_calib::simulate::{ShellError, ShellPose, Shells, ToolError, tool_error};
@@ -188,13 +188,16 @@ fn with_sphere_at(robot: &Robot, poses: &[ShellPose], sphere_tool_m: Vector3<f64
 
 fn recovered(fit: &Fit, truth: &Robot) -> Vec<Recovered> {
     let free = fit.parameters.iter().filter(|parameter| parameter.held.is_none());
-    free.map(|parameter| Recovered {
-        parameter: parameter.parameter,
-        unit: parameter.unit,
-        design: parameter.initial,
-        truth: truth.chain.parameters()[parameter.parameter.index()],
-        fitted: parameter.fitted,
-        std: parameter.std,
-    })
-    .collect()
+    let recovered = |parameter: &FittedParameter| {
+        let which: Parameter = parameter.name.parse().ok()?;
+        Some(Recovered {
+            parameter: which,
+            unit: parameter.unit,
+            design: parameter.initial,
+            truth: truth.chain.parameters()[which.index()],
+            fitted: parameter.fitted,
+            std: parameter.std,
+        })
+    };
+    free.filter_map(recovered).collect()
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ballbar::{JointKind, Kinematics, Vector3};
 use ballbar_calib::assess::Assessment;
-use ballbar_calib::identify::{Fit, FittedParameter, Outlier, Residual, ResidualSummary, residuals};
+use ballbar_calib::identify::{Fit, FittedParameter, Outlier, Residual, ResidualSummary, explanation, residuals};
 use ballbar_calib::model::{Dataset, PairingId, PoseRow, Rig, Robot};
 use nalgebra::DMatrix;
 
@@ -172,8 +172,8 @@ impl Facts {
             },
             rms_history_m: fit.solution.rms_history_m.clone(),
             steps: fit.solution.steps(),
-            explanation: fit.solution.status.explanation(),
-            independent: robot.chain.independent_parameters(),
+            explanation: explanation(fit.solution.status),
+            independent: fit.unknowns.independent(),
             told: fit.uncertainty.spectrum.rank,
             sigma_m: fit.uncertainty.sigma_m,
             neighbour_correlation: fit.neighbour_correlation,
@@ -242,7 +242,7 @@ fn shells(rows: &[RowFact], pairings: &[PairingId]) -> Vec<Shell> {
 
 fn correlation(fit: &Fit) -> Correlation {
     let free = fit.parameters.iter().filter(|parameter| parameter.held.is_none());
-    let names: Vec<String> = free.map(|parameter| parameter.parameter.to_string()).collect();
+    let names: Vec<String> = free.map(|parameter| parameter.name.clone()).collect();
     let uncertainty = &fit.uncertainty;
     let value = |i: usize, j: usize| match (uncertainty.std[i], uncertainty.std[j]) {
         (Some(a), Some(b)) if a > 0.0 && b > 0.0 => (uncertainty.covariance[(i, j)] / (a * b)).clamp(-1.0, 1.0),

@@ -88,7 +88,7 @@ fn parameter_row(parameter: &FittedParameter) -> Markup {
     let of_free = |text: String| if free { text } else { String::new() };
     html! {
         tr class=(if free { "" } else { "held" }) {
-            td { (parameter.parameter) }
+            td { (parameter.name) }
             td { (unit.name()) }
             td.number { (number(parameter.initial)) }
             td.number { (of_free(number(parameter.fitted))) }
@@ -109,7 +109,7 @@ pub fn parameters_table(facts: &Facts) -> Table {
         let [initial, fitted, change] = values;
         let held = parameter.held.as_ref().map(ToString::to_string).unwrap_or_default();
         let deviation = parameter.std.map(number).unwrap_or_default();
-        table.row([parameter.parameter.to_string(), unit.name().to_owned(), initial, fitted, change, deviation, held]);
+        table.row([parameter.name.clone(), unit.name().to_owned(), initial, fitted, change, deviation, held]);
     }
     table
 }

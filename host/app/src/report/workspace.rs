@@ -93,6 +93,8 @@ struct Predictor<'a> {
     design: Kinematics<f64>,
     fitted: Kinematics<f64>,
     free: Vec<usize>,
+    /// Of the chain.
+    parameters: usize,
     covariance: &'a DMatrix<f64>,
 }
 
@@ -103,18 +105,18 @@ impl<'a> Predictor<'a> {
             design: Kinematics::new(&robot.chain),
             fitted: Kinematics::new(&fit.solution.chain),
             free: free.map(|(index, _)| index).collect(),
+            parameters: fit.unknowns.of_chain().len(),
             covariance: &fit.uncertainty.covariance,
         }
     }
 
     fn at(&self, q: &JointVector<f64>) -> WorkspacePoint {
-        let position_m = self.fitted.base_from_tool(q).translation_m;
+        let mut rows = [[0.0; MAX_PARAMETERS]; 3];
+        let position_m = self.fitted.position_gradient(q, &Vector3::zeros(), &mut rows);
         let mut jacobian = Matrix3xX::zeros(self.free.len());
-        let mut row = [0.0; MAX_PARAMETERS];
-        for axis in 0..3 {
-            let force = Vector3::ith(axis, 1.0);
-            self.fitted.wrench_columns(q, force, position_m.cross(&force), &mut row);
-            for (column, &index) in self.free.iter().enumerate() {
+        for (axis, row) in rows.iter().enumerate() {
+            // What is not the chain's does not move its tool: its columns stay zero.
+            for (column, &index) in self.free.iter().enumerate().filter(|(_, index)| **index < self.parameters) {
                 jacobian[(axis, column)] = row[index];
             }
         }

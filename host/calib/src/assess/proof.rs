@@ -2,8 +2,6 @@
 
 use std::collections::HashSet;
 
-use ballbar::Chain;
-
 use super::evidence::Evidence;
 use crate::identify::{Residual, ResidualSummary, postures, residuals};
 use crate::model::{Dataset, PoseRow};
@@ -96,9 +94,8 @@ pub(super) fn proofs(evidence: &Evidence<'_>, before: Vec<Residual>) -> Vec<Proo
     let Evidence { robot, dataset, fit, .. } = evidence;
     let kinds = robot.chain.joint_kinds();
     let proof = |name: String, kind: ProofKind, rows: &Dataset| {
-        let of = |chain: &Chain<f64>| residuals(chain, rows);
         let postures = postures(kinds, rows.rows.iter().map(|row| &row.measurement.q));
-        Proof { name, kind, before: of(&robot.chain), after: of(&fit.solution.chain), postures }
+        Proof { name, kind, before: residuals(&robot.chain, rows), after: fit.residuals_of(rows), postures }
     };
     let (mut apart, mut same) = (Vec::new(), Vec::new());
     for (name, rows) in evidence.unseen {

@@ -5,7 +5,7 @@ use std::fmt;
 use super::evidence::Evidence;
 use super::plausibility::{Change, far_beyond_limits, large_changes};
 use super::proof::{Proof, ProofKind};
-use crate::identify::{Fit, Status};
+use crate::identify::{Fit, Status, explanation};
 use crate::model::Dataset;
 use crate::units::{fixed, mm_from_m};
 
@@ -96,7 +96,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| format!("{} mm", fixed(mm_from_m(m), 3));
         match self {
-            Self::NoMinimum(status) => write!(f, "No minimum was reached: {}.", status.explanation()),
+            Self::NoMinimum(status) => write!(f, "No minimum was reached: {}.", explanation(*status)),
             Self::Unproven => f.write_str("There are too few poses to leave some out and prove the result on them."),
             Self::NoBetter { before_m, after_m, postures } => write!(
                 f,

@@ -47,7 +47,7 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
         ));
     }
     let (told, able) = (fit.uncertainty.spectrum.rank, fit.identifiability.spectrum.rank);
-    let independent = robot.chain.independent_parameters();
+    let independent = fit.unknowns.independent();
     if able < independent {
         reserves.push(format!(
             "These poses tell {able} of the {independent} parameters that lengths can tell of this robot: where the others matter, \

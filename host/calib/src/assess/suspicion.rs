@@ -2,13 +2,13 @@
 
 use std::fmt;
 
-use ballbar::{Chain, FreeParameters, Kinematics, Measurement};
+use ballbar::{Chain, FreeParameters, Kinematics, LmOptions, Measurement};
 
 use super::evidence::Evidence;
 use super::mistake::{Mistake, any_constant, conceivable};
 use super::plausibility::large_changes;
 use super::refusals::Refusal;
-use crate::identify::{Finding, Held, LmOptions, solve};
+use crate::identify::{Finding, Held, solve_lengths};
 use crate::units::{fixed, mm_from_m};
 
 /// What may be wrong. Its text is a whole sentence.
@@ -135,7 +135,8 @@ impl<'a> Trial<'a> {
     fn new(evidence: &Evidence<'a>) -> Self {
         let parameters = &evidence.fit.parameters;
         let is_free = |index: usize| matches!(parameters[index].held, None | Some(Held::Finding(Finding::Weak { .. })));
-        let free = FreeParameters::filtered(parameters.len(), is_free);
+        let of_chain = evidence.fit.unknowns.of_chain().len();
+        let free = FreeParameters::from_indices((0..of_chain).filter(|&index| is_free(index))).unwrap_or(FreeParameters::all(0));
         Self { design: &evidence.robot.chain, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
     }
 
@@ -145,7 +146,7 @@ impl<'a> Trial<'a> {
         if rows.len() <= self.free.len() {
             return None;
         }
-        let fitted = solve(self.design, &rows, &self.free, &self.options).chain;
+        let fitted = solve_lengths(self.design, &rows, &self.free, &self.options).chain;
         let kinematics = Kinematics::new(&fitted);
         let weight: f64 = rows.iter().map(|row| row.weight).sum();
         let squares: f64 = rows.iter().map(|row| row.weight * kinematics.residual(row).powi(2)).sum();

@@ -2,19 +2,21 @@
 
 use std::time::{Duration, Instant};
 
-use ballbar::{Chain, Damping, FreeParameters, Kinematics, Measurement, Parameter, ParameterUnit};
+use ballbar::{Damping, LmOptions, Parameter, ParameterUnit};
 use thiserror::Error;
 
+use super::cross_validation::{CrossValidation, cross_validate};
 use super::hold::{Held, Hold};
 use super::identifiability::Identifiability;
-use super::lm::{LmOptions, Solution, solve};
-use super::postures::postures;
+use super::lm::{Objective, Solution, solve};
+use super::observation::Observation;
 use super::residual::{Residual, ResidualSummary};
-use super::residuals::{ALIKE, Outlier, PairingResiduals, by_pairing, neighbour_correlation, outliers, residuals};
+use super::residuals::{ALIKE, Outlier, PairingResiduals, by_pairing, neighbour_correlation, outliers};
 use super::uncertainty::Uncertainty;
-use crate::model::{Dataset, Robot};
+use crate::model::{Dataset, PoseRow, Rig, Robot};
+use crate::unknowns::{AnyBlock, Unknowns};
 
-/// What to hold, and how to step.
+/// What to find out beside the chain, what to hold, and how to step.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FitOptions {
@@ -22,6 +24,8 @@ pub struct FitOptions {
     pub hold: Hold,
     /// λI or λ·diag.
     pub damping: Damping,
+    /// What is not known beside the chain ([`crate::unknowns::Kind::block`]).
+    pub unknowns: Vec<AnyBlock>,
 }
 
 /// Why there is no fit.
@@ -40,12 +44,12 @@ pub enum FitError {
     NoSuchParameter(Parameter),
 }
 
-/// One parameter before and after.
+/// One unknown before and after.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FittedParameter {
-    /// Which.
-    pub parameter: Parameter,
+    /// What it is called; a chain's parameters stand first, in their order.
+    pub name: String,
     /// Unit of the values.
     pub unit: ParameterUnit,
     /// Design value, SI.
@@ -58,24 +62,13 @@ pub struct FittedParameter {
     pub held: Option<Held>,
 }
 
-/// How well a fit to some poses predicts the others.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CrossValidation {
-    /// Parts that were left out in turn.
-    pub folds: usize,
-    /// Whether each part was measured in one go: where residuals follow one another, what was measured just before and after a pose
-    /// shares its errors and proves nothing of it.
-    pub in_blocks: bool,
-    /// Weighted RMS residual of the poses while they were left out, metres.
-    pub rms_m: f64,
-}
-
 /// The result of a fit.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Fit {
-    /// The fitted chain, why the solve ended, its iterations and the course of its RMS.
+    /// What could be found out.
+    pub unknowns: Unknowns,
+    /// The fitted chain and values, why the solve ended, its iterations and the course of its RMS.
     pub solution: Solution,
     /// Wall time of the solve alone.
     pub solve_time: Duration,
@@ -83,7 +76,7 @@ pub struct Fit {
     pub identifiability: Identifiability,
     /// Deviations and condition at the fitted values.
     pub uncertainty: Uncertainty,
-    /// All parameters, in order.
+    /// All unknowns, in order.
     pub parameters: Vec<FittedParameter>,
     /// Residuals with the design values.
     pub initial: ResidualSummary,
@@ -109,14 +102,24 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Number of free parameters.
+    /// Number of free unknowns.
     pub fn free_parameters(&self) -> usize {
         self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
     }
+
+    /// Residuals of any rows that were measured with the same rig, with the fitted values of all unknowns.
+    pub fn residuals_of(&self, dataset: &Dataset) -> Vec<Residual> {
+        residuals_at(&self.unknowns, &self.solution.values, dataset)
+    }
+
+    /// The rig as it was found to be.
+    pub fn rig(&self, rig: &Rig) -> Rig {
+        self.unknowns.rig(&self.solution.values, rig)
+    }
 }
 
-/// Fits the robot's parameters to the dataset: Levenberg-Marquardt on `Σ w (d_measured − d_computed)²` ([`solve`]) from the design, over
-/// the parameters that [`FitOptions::hold`] leaves free; then what the result is worth, by linear theory and by poses left out in turn.
+/// Fits the robot's parameters, and what else [`FitOptions::unknowns`] asks for, to the dataset: Levenberg-Marquardt on
+/// `Σ w (d_measured − d_computed)²` ([`solve`]) from the design, over what [`FitOptions::hold`] leaves free; then what the result is worth, by linear theory and by poses left out in turn.
 ///
 /// The minimum is the paper's least-squares solution (A. Goswami, A. Quaid and M. Peshkin, IEEE Control Systems 13(5), 1993); which parameters
 /// are free is found anew for each dataset ([`Identifiability`]).
@@ -145,35 +148,43 @@ impl Fit {
 /// # Errors
 /// [`FitError`] when there are no more poses than free parameters, or when a parameter is to be held that the robot lacks.
 pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
-    let design = &robot.chain;
-    let measurements = dataset.measurements();
-    let names = options.hold.names.as_slice();
-    if let Some(&name) = names.iter().find(|name| name.index() >= design.parameter_count()) {
+    let unknowns = Unknowns::new(&robot.chain, options.unknowns.clone());
+    let chain = unknowns.of_chain();
+    let named: Vec<usize> = options.hold.names.iter().map(|name| name.index()).collect();
+    if let Some(&name) = options.hold.names.iter().find(|name| name.index() >= chain.len()) {
         return Err(FitError::NoSuchParameter(name));
     }
-    let identifiability = Identifiability::new(design, &measurements, &robot.limits, names);
-    let reasons = options.hold.reasons(design, &identifiability);
-    let free = FreeParameters::filtered(reasons.len(), |index| reasons[index].is_none());
-    if measurements.len() <= free.len() {
-        return Err(FitError::NoRedundancy { rows: measurements.len(), free: free.len() });
+    let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
+    let start = unknowns.start();
+    let found = |sigma_m: f64| {
+        Identifiability::of(chain, unknowns.list(), &Observation::of(&unknowns, &start, &rows, sigma_m), &robot.limits, &named)
+    };
+    let sigma_m = sigma_m(dataset, &unknowns, |sigma_m| found(sigma_m).noise_m);
+    let identifiability = found(sigma_m);
+    let reasons = options.hold.reasons(chain, &identifiability);
+    let free: Vec<usize> = (0..reasons.len()).filter(|&index| reasons[index].is_none()).collect();
+    let beliefs = free.iter().filter(|&&index| unknowns.list()[index].tolerance.is_some()).count();
+    if rows.len() + beliefs <= free.len() {
+        return Err(FitError::NoRedundancy { rows: rows.len(), free: free.len() - beliefs });
     }
 
     let lm = LmOptions { damping: options.damping, ..LmOptions::default() };
-    let start = Instant::now();
-    let solution = solve(design, &measurements, &free, &lm);
-    let solve_time = start.elapsed();
+    let objective = Objective { unknowns: &unknowns, rows: &rows, free: &free, sigma_m };
+    let began = Instant::now();
+    let solution = solve(&objective, &lm);
+    let solve_time = began.elapsed();
 
-    let uncertainty = Uncertainty::new(&solution.chain, &measurements, &free);
-    let before = residuals(design, dataset);
-    let after = residuals(&solution.chain, dataset);
-    let base_alone = base_alone(design, dataset, &measurements, &reasons, &lm);
+    let uncertainty = Uncertainty::new(&Observation::of(&unknowns, &solution.values, &rows, sigma_m), &free);
+    let before = residuals_at(&unknowns, &start, dataset);
+    let after = residuals_at(&unknowns, &solution.values, dataset);
+    let base_alone = base_alone(&objective, dataset, &reasons, &lm);
     let neighbour_correlation = neighbour_correlation(dataset, &after);
     let in_blocks = neighbour_correlation.is_some_and(|correlation| correlation > ALIKE);
-    let (cross_validation, left_out) = cross_validate(design, &measurements, &free, &lm, in_blocks).unzip();
+    let (cross_validation, left_out) = cross_validate(&objective, &lm, in_blocks).unzip();
     Ok(Fit {
         solve_time,
         identifiability,
-        parameters: fitted_parameters(design, &solution.chain, &free, &uncertainty, reasons),
+        parameters: fitted_parameters(&unknowns, &solution.values, &free, &uncertainty, reasons),
         initial: ResidualSummary::new(&before),
         fitted: ResidualSummary::new(&after),
         initial_by_pairing: by_pairing(dataset, &before),
@@ -186,73 +197,54 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
         residuals: after,
         uncertainty,
         solution,
+        unknowns,
     })
 }
 
+/// What a length of weight one deviates by, metres: as it is stated, or else as the lengths show it. Without meaning, and not looked for,
+/// where nothing is weighed against it.
+fn sigma_m(dataset: &Dataset, unknowns: &Unknowns, shown_m: impl Fn(f64) -> f64) -> f64 {
+    /// What good ball-bars deviate by.
+    const USUAL_M: f64 = 5e-5;
+    /// Each beside the one before; more change nothing that could be seen.
+    const ROUNDS: usize = 2;
+    match dataset.stated_sigma_m() {
+        Some(stated_m) => stated_m,
+        None if unknowns.have_priors() => (0..ROUNDS).fold(USUAL_M, |sigma_m, _| shown_m(sigma_m).max(f64::MIN_POSITIVE)),
+        None => USUAL_M,
+    }
+}
+
+fn residuals_at(unknowns: &Unknowns, values: &[f64], dataset: &Dataset) -> Vec<Residual> {
+    Residual::of_rows(unknowns, values, dataset.rows.iter())
+}
+
 /// What of the design's error is only that nobody knew where the robot stands: no fault of the robot, and corrected by a frame.
-fn base_alone(
-    design: &Chain<f64>,
-    dataset: &Dataset,
-    measurements: &[Measurement<f64>],
-    reasons: &[Option<Held>],
-    lm: &LmOptions,
-) -> Option<ResidualSummary> {
-    /// Position and orientation of the first link, the first in parameter order.
-    const BASE: usize = 6;
-    let is_wanted = reasons.iter().take(BASE).all(|held| !matches!(held, Some(Held::ByName)));
+fn base_alone(objective: &Objective<'_>, dataset: &Dataset, reasons: &[Option<Held>], lm: &LmOptions) -> Option<ResidualSummary> {
+    let base: Vec<usize> = objective.unknowns.of_chain().of_base().collect();
+    let is_wanted = base.iter().all(|&index| !matches!(reasons[index], Some(Held::ByName)));
     is_wanted.then(|| {
-        let base = solve(design, measurements, &FreeParameters::all(BASE), lm).chain;
-        ResidualSummary::new(&residuals(&base, dataset))
+        let values = solve(&Objective { free: &base, ..*objective }, lm).values;
+        ResidualSummary::new(&residuals_at(objective.unknowns, &values, dataset))
     })
 }
 
 fn fitted_parameters(
-    design: &Chain<f64>,
-    fitted: &Chain<f64>,
-    free: &FreeParameters,
+    unknowns: &Unknowns,
+    values: &[f64],
+    free: &[usize],
     uncertainty: &Uncertainty,
     reasons: Vec<Option<Held>>,
 ) -> Vec<FittedParameter> {
-    let std_of = |index: usize| {
-        let position = free.indices().position(|free| free == index)?;
-        uncertainty.std[position]
-    };
-    let values = design.parameters().iter().zip(fitted.parameters()).zip(reasons).enumerate();
-    values
-        .map(|(index, ((&initial, &fitted), held))| {
-            let parameter = Parameter::from_index(index);
-            FittedParameter { parameter, unit: design.unit(parameter), initial, fitted, std: std_of(index), held }
-        })
-        .collect()
-}
-
-/// Cross-validation in five parts, or in more where five would leave too few poses to fit; `None` where any would. Rows of the
-/// same posture stay together: lengths to other spheres of one pose are no independent proof of it. Parts are taken in turn, or in
-/// blocks of what was measured in one go.
-fn cross_validate(
-    design: &Chain<f64>,
-    measurements: &[Measurement<f64>],
-    free: &FreeParameters,
-    lm: &LmOptions,
-    in_blocks: bool,
-) -> Option<(CrossValidation, Vec<Residual>)> {
-    let group_of_row = postures(design.joint_kinds(), measurements.iter().map(|measurement| &measurement.q));
-    let groups = group_of_row.iter().max().map_or(0, |last| last + 1);
-    let fold_of = |group: usize, folds: usize| if in_blocks { group * folds / groups } else { group % folds };
-    let kept = |folds: usize, fold: usize| group_of_row.iter().filter(|&&group| fold_of(group, folds) != fold).count();
-    let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| kept(folds, fold) > free.len());
-    let folds = [5, 10, groups].into_iter().find(enough)?;
-
-    let mut left_out = vec![Residual { value_m: 0.0, weight: 1.0 }; measurements.len()];
-    for fold in 0..folds {
-        let is_left_out = |row: usize| fold_of(group_of_row[row], folds) == fold;
-        let kept: Vec<_> = (0..measurements.len()).filter(|&row| !is_left_out(row)).map(|row| measurements[row]).collect();
-        let kinematics = Kinematics::new(&solve(design, &kept, free, lm).chain);
-        for row in (0..measurements.len()).filter(|&row| is_left_out(row)) {
-            let measurement = &measurements[row];
-            left_out[row] = Residual { value_m: kinematics.residual(measurement), weight: measurement.weight };
-        }
-    }
-    let squares: f64 = left_out.iter().map(|f| f.weight * f.value_m.powi(2)).sum();
-    Some((CrossValidation { folds, in_blocks, rms_m: (squares / measurements.len() as f64).sqrt() }, left_out))
+    let std_of = |index: usize| free.binary_search(&index).ok().and_then(|position| uncertainty.std[position]);
+    let list = unknowns.list().iter().zip(values).zip(reasons).enumerate();
+    list.map(|(index, ((unknown, &fitted), held))| FittedParameter {
+        name: unknown.name.clone(),
+        unit: unknown.unit,
+        initial: unknown.start,
+        fitted,
+        std: std_of(index),
+        held,
+    })
+    .collect()
 }

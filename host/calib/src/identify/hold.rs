@@ -2,9 +2,10 @@
 
 use std::fmt;
 
-use ballbar::{Chain, Parameter};
+use ballbar::Parameter;
 
 use super::identifiability::{Finding, Identifiability};
+use crate::unknowns::ChainBlock;
 
 /// Which parameters stay at their design values: a rule, and parameters by name besides.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,16 +41,13 @@ impl Hold {
         Self { rule: HoldRule::None, names: Vec::new() }
     }
 
-    /// Why each parameter is held; `None` for the free ones.
-    pub fn reasons(&self, chain: &Chain<f64>, found: &Identifiability) -> Vec<Option<Held>> {
-        let reason = |(index, finding): (usize, &Finding)| {
-            let parameter = Parameter::from_index(index);
-            match self.rule {
-                _ if self.names.contains(&parameter) => Some(Held::ByName),
-                HoldRule::Auto if *finding != Finding::Identified => Some(Held::Finding(finding.clone())),
-                HoldRule::Paper if chain.is_conventionally_held(parameter) => Some(Held::AsInPaper),
-                HoldRule::Auto | HoldRule::Paper | HoldRule::None => None,
-            }
+    /// Why each unknown is held; `None` for the free ones.
+    pub fn reasons(&self, chain: &ChainBlock, found: &Identifiability) -> Vec<Option<Held>> {
+        let reason = |(index, finding): (usize, &Finding)| match self.rule {
+            _ if self.names.iter().any(|name| name.index() == index) => Some(Held::ByName),
+            HoldRule::Auto if *finding != Finding::Identified => Some(Held::Finding(finding.clone())),
+            HoldRule::Paper if chain.is_held_in_paper(index) => Some(Held::AsInPaper),
+            HoldRule::Auto | HoldRule::Paper | HoldRule::None => None,
         };
         found.findings.iter().enumerate().map(reason).collect()
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use ballbar::{Chain, Measurement, Pairing, Parameter, ParameterUnit, Vector3};
+use ballbar::{Chain, Measurement, Pairing, ParameterUnit, Vector3};
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,18 +12,9 @@ use super::pivoting::PivotedColumns;
 use super::spectrum::{RANK_THRESHOLD, Spectrum, column_scales, is_zero_column};
 use crate::model::JointLimits;
 use crate::units::ScreenUnit;
+use crate::unknowns::{ChainBlock, Unknown};
 
-/// How far a design value may plausibly be off, SI: 5 mm, 0.5°, 0.5 %. A parameter whose standard deviation from these poses
-/// would exceed this is better left at its design value, which tells more than the poses do.
-pub fn plausible_error(unit: ParameterUnit) -> f64 {
-    match unit {
-        ParameterUnit::Metre => 5e-3,
-        ParameterUnit::Radian => 0.5_f64.to_radians(),
-        ParameterUnit::One => 5e-3,
-    }
-}
-
-/// What the poses say of one parameter.
+/// What the poses say of one unknown.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Finding {
@@ -34,12 +25,12 @@ pub enum Finding {
     /// Whatever is measured at the tool, the parameters of the subset named here move it in the same way.
     Redundant {
         /// Those that mimic it, strongest first.
-        with: Vec<Parameter>,
+        with: Vec<String>,
     },
     /// Other measurements could tell it; in these poses the parameters named here change the lengths in the same way.
     NotExcited {
         /// Those that mimic it, strongest first.
-        with: Vec<Parameter>,
+        with: Vec<String>,
     },
     /// No length of these poses changes with it.
     NoEffect,
@@ -96,16 +87,16 @@ fn significant(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-fn list(parameters: &[Parameter]) -> String {
+fn list(names: &[String]) -> String {
     const SHOWN: usize = 4;
-    let names: Vec<String> = parameters.iter().take(SHOWN).map(Parameter::to_string).collect();
-    match parameters.len().saturating_sub(SHOWN) {
-        0 => names.join(", "),
-        more => format!("{} and {more} more", names.join(", ")),
+    let shown = names[..names.len().min(SHOWN)].join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
     }
 }
 
-/// What a set of poses can tell about a chain: the rank of its Jacobian, an independent subset of its columns, and what is with the others.
+/// What a set of poses can tell: the rank of its Jacobian, an independent subset of its columns, and what is with the others.
 ///
 /// ```
 /// use ballbar_calib::designs;
@@ -125,84 +116,101 @@ fn list(parameters: &[Parameter]) -> String {
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Identifiability {
+    /// Names of the unknowns, in order.
+    pub names: Vec<String>,
     /// Singular values of all columns.
     pub spectrum: Spectrum,
-    /// One finding a parameter, in parameter order.
+    /// One finding an unknown, in their order.
     pub findings: Vec<Finding>,
-    /// RMS of what no linear change of the independent parameters explains, metres: the noise as the data show it. Zero when
-    /// there are no more rows than independent parameters.
+    /// RMS of what no linear change of the independent unknowns explains, metres: the noise as the data show it. Zero when
+    /// there are no more rows than independent unknowns.
     pub noise_m: f64,
 }
 
 impl Identifiability {
     /// Judges all parameters of `chain` by the weighted Jacobian at its present values. The subset is chosen around the
-    /// parameters in `held`, which are not free whatever the poses say.
-    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], held: &[Parameter]) -> Self {
-        let rows = measurements.len();
-        let observation = Observation::new(chain, measurements);
+    /// parameters at the indices `held`, which are not free whatever the poses say.
+    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], held: &[usize]) -> Self {
+        let block = ChainBlock::new(chain.clone());
+        Self::of(&block, &block.unknowns(), &Observation::new(chain, measurements), limits, held)
+    }
+
+    /// Judges all unknowns, those of a chain and others behind them, by an observation of them all.
+    pub(super) fn of(
+        chain: &ChainBlock,
+        unknowns: &[Unknown],
+        observation: &Observation,
+        limits: &[JointLimits],
+        held: &[usize],
+    ) -> Self {
+        let is_last = |index: usize| chain.is_held_in_paper(index);
+        let names: Vec<String> = unknowns.iter().map(|unknown| unknown.name.clone()).collect();
         let spectrum = Spectrum::new(&observation.jacobian);
-        let independent = independent_columns(chain, &observation.jacobian, spectrum.rank, held);
-        let noise_m = unexplained_rms(&observation, &independent, rows);
+        let independent = independent_columns(is_last, &observation.jacobian, spectrum.rank, held);
+        let noise_m = unexplained_rms(observation, &independent);
 
-        let reference = reference_jacobian(chain, limits);
-        let always_independent = independent_columns(chain, &reference, Spectrum::new(&reference).rank, held);
+        let reference = reference_jacobian(chain.design(), limits);
+        let always_independent = independent_columns(is_last, &reference, Spectrum::new(&reference).rank, held);
+        let is_redundant = |index: usize| index < chain.len() && !always_independent.contains(&index);
+        let called = |indices: Vec<usize>| indices.into_iter().map(|index| names[index].clone()).collect();
 
-        let mut findings = vec![Finding::Identified; chain.parameter_count()];
-        for (index, std) in weak_columns(chain, &observation.jacobian, &independent, noise_m) {
-            let unit = chain.unit(Parameter::from_index(index));
-            findings[index] = Finding::Weak { std, plausible: plausible_error(unit), unit };
+        let mut findings = vec![Finding::Identified; unknowns.len()];
+        for (index, std) in weak_columns(unknowns, &observation.jacobian, &independent, noise_m) {
+            let Unknown { plausible, unit, .. } = unknowns[index];
+            findings[index] = Finding::Weak { std, plausible, unit };
         }
         let largest = observation.jacobian.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
-        for index in (0..chain.parameter_count()).filter(|index| !independent.contains(index)) {
-            findings[index] = if held.contains(&Parameter::from_index(index)) {
+        for index in (0..unknowns.len()).filter(|index| !independent.contains(index)) {
+            findings[index] = if held.contains(&index) {
                 Finding::LeftOut
-            } else if !always_independent.contains(&index) {
-                Finding::Redundant { with: mimics(&reference, &always_independent, index) }
+            } else if is_redundant(index) {
+                Finding::Redundant { with: called(mimics(&reference, &always_independent, index)) }
             } else if is_zero_column(observation.jacobian.column(index).norm(), largest) {
                 Finding::NoEffect
             } else {
-                Finding::NotExcited { with: mimics(&observation.jacobian, &independent, index) }
+                Finding::NotExcited { with: called(mimics(&observation.jacobian, &independent, index)) }
             };
         }
-        Self { spectrum, findings, noise_m }
+        Self { names, spectrum, findings, noise_m }
     }
 
-    /// The parameters that the data identify, ascending.
+    /// The unknowns that the data identify, ascending.
     pub fn identified(&self) -> Vec<usize> {
         (0..self.findings.len()).filter(|&index| self.findings[index] == Finding::Identified).collect()
     }
 
-    /// The parameters that the data do not identify, with the reason.
-    pub fn not_identified(&self) -> impl Iterator<Item = (Parameter, &Finding)> + '_ {
-        let findings =
-            self.findings.iter().enumerate().filter(|(_, finding)| !matches!(finding, Finding::Identified | Finding::LeftOut));
-        findings.map(|(index, finding)| (Parameter::from_index(index), finding))
+    /// The unknowns that the data do not identify, by name, with the reason.
+    pub fn not_identified(&self) -> impl Iterator<Item = (&str, &Finding)> + '_ {
+        let findings = self.names.iter().zip(&self.findings);
+        let missed = findings.filter(|(_, finding)| !matches!(finding, Finding::Identified | Finding::LeftOut));
+        missed.map(|(name, finding)| (name.as_str(), finding))
     }
 }
 
-/// A largest independent subset of the columns, ascending: first as many as possible of those that the paper leaves free, then
-/// of those it holds. In each group in the order of what the scaled columns add, the second group after what the first explains.
-fn independent_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, rank: usize, held: &[Parameter]) -> Vec<usize> {
-    let all = (0..chain.parameter_count()).filter(|&index| !held.contains(&Parameter::from_index(index)));
-    let (held, free): (Vec<_>, Vec<_>) = all.partition(|&index| chain.is_conventionally_held(Parameter::from_index(index)));
+/// A largest independent subset of the columns, ascending: first as many as possible of those that are not `is_last`, which for a chain
+/// are those that the paper leaves free, then of the others. In each group in the order of what the scaled columns add, the second group
+/// after what the first explains.
+fn independent_columns(is_last: impl Fn(usize) -> bool, jacobian: &DMatrix<f64>, rank: usize, held: &[usize]) -> Vec<usize> {
+    let all = (0..jacobian.ncols()).filter(|index| !held.contains(index));
+    let (last, first): (Vec<_>, Vec<_>) = all.partition(|&index| is_last(index));
     let scales = column_scales(jacobian);
     let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| jacobian[(row, column)] / scales[column]);
 
     // Scaled columns have unit norm, so pivots compare with 1.
-    let first = PivotedColumns::new(scaled.select_columns(&free), RANK_THRESHOLD);
-    let rest = scaled.select_columns(&held);
-    let unexplained = &rest - &first.basis * first.basis.tr_mul(&rest);
-    let second = PivotedColumns::new(unexplained, RANK_THRESHOLD);
+    let of_first = PivotedColumns::new(scaled.select_columns(&first), RANK_THRESHOLD);
+    let rest = scaled.select_columns(&last);
+    let unexplained = &rest - &of_first.basis * of_first.basis.tr_mul(&rest);
+    let of_last = PivotedColumns::new(unexplained, RANK_THRESHOLD);
 
-    let mut chosen: Vec<usize> = first.order.iter().map(|&k| free[k]).chain(second.order.iter().map(|&k| held[k])).collect();
+    let mut chosen: Vec<usize> = of_first.order.iter().map(|&k| first[k]).chain(of_last.order.iter().map(|&k| last[k])).collect();
     chosen.truncate(rank);
     chosen.sort_unstable();
     chosen
 }
 
 /// RMS of the residual's part outside the span of the columns, per degree of freedom.
-fn unexplained_rms(observation: &Observation, independent: &[usize], rows: usize) -> f64 {
-    let freedom = rows.saturating_sub(independent.len());
+fn unexplained_rms(observation: &Observation, independent: &[usize]) -> f64 {
+    let freedom = observation.count.saturating_sub(independent.len());
     if freedom == 0 {
         return 0.0;
     }
@@ -216,9 +224,8 @@ fn unexplained_rms(observation: &Observation, independent: &[usize], rows: usize
 /// Columns are scaled by the plausible error, so that a pivot is the size, over all rows, of what a plausible error of the
 /// parameter does to the lengths and the stronger parameters cannot do; `noise / pivot` is then its standard deviation in
 /// units of the plausible error.
-fn weak_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, independent: &[usize], noise_m: f64) -> Vec<(usize, f64)> {
-    let plausible: Vec<f64> =
-        independent.iter().map(|&index| plausible_error(chain.unit(Parameter::from_index(index)))).collect();
+fn weak_columns(unknowns: &[Unknown], jacobian: &DMatrix<f64>, independent: &[usize], noise_m: f64) -> Vec<(usize, f64)> {
+    let plausible: Vec<f64> = independent.iter().map(|&index| unknowns[index].plausible).collect();
     let mut effects = jacobian.select_columns(independent);
     for (mut column, plausible) in effects.column_iter_mut().zip(&plausible) {
         column *= *plausible;
@@ -229,7 +236,7 @@ fn weak_columns(chain: &Chain<f64>, jacobian: &DMatrix<f64>, independent: &[usiz
 }
 
 /// Which columns of the subset make up another column, strongest first.
-fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<Parameter> {
+fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<usize> {
     let columns = jacobian.select_columns(subset);
     let target = jacobian.column(index).into_owned();
     let qr = columns.clone().qr();
@@ -243,7 +250,7 @@ fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<Parame
     shares.sort_by(|a, b| b.1.total_cmp(&a.1));
     // A thousandth part is not what makes a column look like another.
     let strongest = shares.first().map_or(0.0, |share| share.1);
-    shares.iter().take_while(|share| share.1 > 1e-3 * strongest).map(|share| Parameter::from_index(share.0)).collect()
+    shares.iter().take_while(|share| share.1 > 1e-3 * strongest).map(|share| share.0).collect()
 }
 
 /// The Jacobian of an experiment that excites whatever can be excited: random poses within the limits, random pairings of

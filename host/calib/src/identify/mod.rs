@@ -1,15 +1,16 @@
 //! From measured lengths to parameters.
 //!
 //! ```text
-//! Dataset ─▶ Observation (J, f at the start) ─▶ Identifiability (rank, independent subset, reasons)
-//!                                                     │ Hold
-//!                                                     ▼
-//!                                    FreeParameters ─▶ lm::solve ─▶ Fit (deviations, residuals, outliers, held-out RMS)
+//! Dataset, Unknowns ─▶ Observation (J, f at the start) ─▶ Identifiability (rank, independent subset, reasons)
+//!                                                               │ Hold
+//!                                                               ▼
+//!                                                  Objective ─▶ lm::solve ─▶ Fit (deviations, residuals, outliers, held-out RMS)
 //! ```
 //!
 //! `docs/identification.md` says how each decision is made and why.
 
 mod advice;
+mod cross_validation;
 mod fit;
 mod fit_remarks;
 mod hold;
@@ -27,11 +28,13 @@ mod trend;
 mod uncertainty;
 
 pub use advice::{bound_by_ends, bound_by_pairings, remarks};
-pub use fit::{CrossValidation, Fit, FitError, FitOptions, FittedParameter, fit};
+pub use ballbar::{ConvergenceTest, LmOptions, Status};
+pub use cross_validation::CrossValidation;
+pub use fit::{Fit, FitError, FitOptions, FittedParameter, fit};
 pub use fit_remarks::FitRemark;
 pub use hold::{Held, Hold, HoldRule};
-pub use identifiability::{Finding, Identifiability, plausible_error};
-pub use lm::{ConvergenceTest, LmOptions, Solution, Status, solve};
+pub use identifiability::{Finding, Identifiability};
+pub use lm::{Objective, Solution, explanation, solve, solve_lengths};
 pub use normality::{AndersonDarling, anderson_darling};
 pub use observation::Observation;
 pub use offsets::{Offset, farthest_offset};

@@ -1,48 +1,114 @@
-//! The Jacobian and residuals of a set of measurements at one set of parameters.
+//! The Jacobian and residuals of a set of measurements at one set of values.
 
-use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement};
+use ballbar::{Chain, Kinematics, LANES, Lanes, LengthRows, Measurement, Rows};
 use nalgebra::{DMatrix, DVector};
 
+use crate::model::PoseRow;
+use crate::unknowns::Unknowns;
+
 /// `√w J` and `√w f` of any number of measurements in at most P + 1 rows: the triangle R of `[J f] = Q R`, which has the norms
-/// of all columns and the angles between them. Metres per SI unit, and metres.
+/// of all columns and the angles between them. Metres per SI unit, and metres. What is believed beforehand counts as measured.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// At most P + 1 rows, one column for each of the P parameters of the chain.
+    /// At most P + 1 rows, one column for each of the P unknowns.
     pub jacobian: DMatrix<f64>,
     /// Residuals, measured less computed, seen from the rows of `jacobian`.
     pub residual_m: DVector<f64>,
+    /// Measurements, and beliefs that count as such.
+    pub count: usize,
 }
 
-/// Measurements that are evaluated before they are reduced: bounds the memory whatever their number.
-const BLOCK: usize = 1024;
-
 impl Observation {
-    /// Evaluates all measurements.
+    /// Evaluates lengths over all parameters of a chain.
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>]) -> Self {
-        let columns = chain.parameter_count();
+        let mut reduction = Reduction::new(chain.parameter_count());
         let kinematics = Kinematics::new(chain);
-        let mut triangle = DMatrix::zeros(0, columns + 1);
-        for block in measurements.chunks(BLOCK) {
-            let above = triangle.nrows();
-            triangle = triangle.resize_vertically(above + block.len(), 0.0);
-            let mut row = [0.0; MAX_PARAMETERS];
-            for (i, measurement) in block.iter().enumerate() {
-                let root_weight = measurement.weight.sqrt();
-                let residual_m = kinematics.residual_row(measurement, &mut row);
-                for (entry, value) in triangle.row_mut(above + i).iter_mut().zip(row[..columns].iter().chain([&residual_m])) {
-                    *entry = root_weight * value;
-                }
-            }
-            if triangle.nrows() > triangle.ncols() {
-                triangle = triangle.qr().r();
+        let mut swept = LengthRows::default();
+        let mut columns: Vec<Lanes<f64>> = vec![[0.0; LANES]; chain.parameter_count()];
+        for block in measurements.chunks(LANES) {
+            swept.compute(&kinematics, block);
+            columns.iter_mut().enumerate().for_each(|(index, column)| *column = *swept.chain(index));
+            reduction.add(&swept.over(&columns));
+        }
+        reduction.end()
+    }
+
+    /// Evaluates rows over all unknowns, at these values, with what is believed of them beside lengths that deviate by `sigma_m` (metres, of
+    /// weight one).
+    pub fn of(unknowns: &Unknowns, values: &[f64], rows: &[&PoseRow], sigma_m: f64) -> Self {
+        let all: Vec<usize> = (0..unknowns.list().len()).collect();
+        let mut reduction = Reduction::new(all.len());
+        unknowns.for_each_block(values, rows, &all, |rows| reduction.add(rows));
+        for (index, (unknown, precision)) in unknowns.list().iter().zip(unknowns.precision(sigma_m)).enumerate() {
+            if precision > 0.0 {
+                reduction.add_belief(index, precision.sqrt(), values[index] - unknown.start);
             }
         }
-        let residual_m = triangle.column(columns).into_owned();
-        Self { jacobian: triangle.remove_column(columns), residual_m }
+        reduction.end()
     }
 
     /// Only the given columns.
     pub fn columns(&self, indices: &[usize]) -> DMatrix<f64> {
         self.jacobian.select_columns(indices)
+    }
+}
+
+/// `[J f]`, gathered row by row and reduced to its triangle whenever it has grown long.
+struct Reduction {
+    triangle: DMatrix<f64>,
+    filled: usize,
+    count: usize,
+}
+
+impl Reduction {
+    /// Rows that are kept before they are reduced: bounds the memory whatever their number.
+    const KEPT: usize = 1024;
+
+    fn new(unknowns: usize) -> Self {
+        Self { triangle: DMatrix::zeros(Self::KEPT + unknowns + 1, unknowns + 1), filled: 0, count: 0 }
+    }
+
+    fn add(&mut self, rows: &Rows<'_, f64>) {
+        self.make_room(rows.count);
+        let residual = rows.columns.len();
+        for lane in 0..rows.count {
+            let root_weight = rows.weight[lane].sqrt();
+            for (column, entries) in rows.columns.iter().enumerate() {
+                self.triangle[(self.filled, column)] = root_weight * entries[lane];
+            }
+            self.triangle[(self.filled, residual)] = root_weight * rows.residual_m[lane];
+            self.filled += 1;
+        }
+        self.count += rows.count;
+    }
+
+    fn add_belief(&mut self, unknown: usize, root_precision: f64, deviation: f64) {
+        self.make_room(1);
+        self.triangle.row_mut(self.filled).fill(0.0);
+        self.triangle[(self.filled, unknown)] = root_precision;
+        let residual = self.triangle.ncols() - 1;
+        self.triangle[(self.filled, residual)] = -root_precision * deviation;
+        self.filled += 1;
+        self.count += 1;
+    }
+
+    fn make_room(&mut self, rows: usize) {
+        if self.filled + rows > self.triangle.nrows() {
+            let reduced = self.reduced();
+            self.filled = reduced.nrows();
+            self.triangle.rows_mut(0, self.filled).copy_from(&reduced);
+        }
+    }
+
+    fn reduced(&self) -> DMatrix<f64> {
+        let rows = self.triangle.rows(0, self.filled).into_owned();
+        if rows.nrows() > rows.ncols() { rows.qr().r() } else { rows }
+    }
+
+    fn end(self) -> Observation {
+        let triangle = self.reduced();
+        let last = triangle.ncols() - 1;
+        let residual_m = triangle.column(last).into_owned();
+        Observation { jacobian: triangle.remove_column(last), residual_m, count: self.count }
     }
 }

@@ -1,5 +1,10 @@
 //! Residuals as numbers.
 
+use ballbar::Kinematics;
+
+use crate::model::PoseRow;
+use crate::unknowns::Unknowns;
+
 /// A residual `f = d_measured − d_computed` and its weight, 1 on average.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -11,6 +16,16 @@ pub struct Residual {
 }
 
 impl Residual {
+    /// Of some rows, at these values of all unknowns.
+    pub(super) fn of_rows<'a>(unknowns: &Unknowns, values: &[f64], rows: impl Iterator<Item = &'a PoseRow>) -> Vec<Self> {
+        let kinematics = Kinematics::new(&unknowns.chain(values));
+        let of = |row: &PoseRow| {
+            let measurement = unknowns.corrected(values, row);
+            Self { value_m: kinematics.residual(&measurement), weight: measurement.weight }
+        };
+        rows.map(of).collect()
+    }
+
     /// `√w f`: all of these scatter alike, metres.
     pub fn whitened_m(self) -> f64 {
         self.weight.sqrt() * self.value_m

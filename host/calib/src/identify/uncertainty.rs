@@ -1,22 +1,21 @@
 //! Standard deviations of the fitted parameters.
 
-use ballbar::{Chain, FreeParameters, Measurement};
 use nalgebra::DMatrix;
 
 use super::observation::Observation;
 use super::spectrum::Spectrum;
 
-/// The linear theory at the solution: `cov = s² (JᵀWJ)⁻¹`, `s² = Σ w f² / (n − r)`, for n lengths, f free parameters and rank r.
+/// The linear theory at the solution: `cov = s² (JᵀWJ)⁻¹`, `s² = Σ w f² / (n − r)`, for n lengths (beliefs included), f free unknowns and rank r.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Uncertainty {
-    /// One a free parameter, in parameter order, SI: `None` where the data leave the parameter undetermined.
+    /// One a free unknown, in their order, SI: `None` where the data leave the parameter undetermined.
     pub std: Vec<Option<f64>>,
     /// Estimated standard deviation s of a length of weight 1, metres; `None` without redundancy.
     pub sigma_m: Option<f64>,
     /// Singular values of the f free columns, scaled.
     pub spectrum: Spectrum,
-    /// Covariance of the free parameters, f × f in parameter order, SI units; only its entries between determined parameters mean anything.
+    /// Covariance of the free unknowns, f × f in their order, SI units; only its entries between determined parameters mean anything.
     pub covariance: DMatrix<f64>,
 }
 
@@ -24,12 +23,10 @@ pub struct Uncertainty {
 const NULL_SHARE: f64 = 1e-10;
 
 impl Uncertainty {
-    /// Evaluates J at the chain's values.
-    pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], free: &FreeParameters) -> Self {
-        let observation = Observation::new(chain, measurements);
-        let indices: Vec<usize> = free.indices().collect();
-        let spectrum = Spectrum::of_columns(&observation.jacobian, &indices);
-        let freedom = measurements.len().saturating_sub(spectrum.rank);
+    /// By the columns at the indices `free` of an observation at the solution.
+    pub fn new(observation: &Observation, free: &[usize]) -> Self {
+        let spectrum = Spectrum::of_columns(&observation.jacobian, free);
+        let freedom = observation.count.saturating_sub(spectrum.rank);
         let sigma_m = (freedom > 0).then(|| (observation.residual_m.norm_squared() / freedom as f64).sqrt());
 
         // (JᵀJ)⁺ = V S⁻² Vᵀ over the directions that count, with the column scales put back.
@@ -42,8 +39,8 @@ impl Uncertainty {
             line *= sigma_m.unwrap_or(f64::NAN) / scale;
         }
         let covariance = &root * root.transpose();
-        let null = spectrum.right.columns(spectrum.rank, indices.len() - spectrum.rank);
-        let std = (0..indices.len())
+        let null = spectrum.right.columns(spectrum.rank, free.len() - spectrum.rank);
+        let std = (0..free.len())
             .map(|i| (null.row(i).norm_squared() < NULL_SHARE && sigma_m.is_some()).then(|| covariance[(i, i)].sqrt()))
             .collect();
         Self { std, sigma_m, spectrum, covariance }

@@ -205,19 +205,6 @@ impl Dataset {
         self.rows.iter().map(|row| row.measurement).collect()
     }
 
-    /// The same poses with lengths from which a lag of the LVDT was removed, instead of what was removed before.
-    #[must_use]
-    pub fn with_lag_removed(&self, lag_s: f64) -> Self {
-        let mut corrected = self.clone();
-        for row in &mut corrected.rows {
-            if let Some(motion) = &mut row.motion {
-                row.measurement.length_m += (lag_s - motion.removed_lag_s) * motion.rate_m_s;
-                motion.removed_lag_s = lag_s;
-            }
-        }
-        corrected
-    }
-
     /// What the rows' deviations say that `√w f` scatter by, the residuals times the root of their weight, metres: the same for all rows. `None`
     /// where it is not given.
     pub fn stated_sigma_m(&self) -> Option<f64> {

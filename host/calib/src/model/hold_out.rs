@@ -82,7 +82,7 @@ impl Dataset {
 impl PoseRow {
     /// Length at mid travel of the bar that the row was measured with, metres: as it says itself, or the one of the rig within whose travel
     /// its length lies.
-    fn bar_with(&self, rig: &Rig) -> Option<f64> {
+    pub(crate) fn bar_with(&self, rig: &Rig) -> Option<f64> {
         let by_length = || {
             let bar = rig.bar.as_ref()?;
             let off = |mid_m: f64| (self.measurement.length_m - mid_m).abs();
@@ -95,13 +95,13 @@ impl PoseRow {
 
 #[cfg(test)]
 mod tests {
-    use ballbar::{JointVector, Measurement, Vector3};
+    use ballbar::{JointVector, Measurement};
 
     use super::*;
     use crate::model::{Bar, NamedPoint, Solids};
 
     fn rig() -> Rig {
-        let point = |name: &str, x_m| NamedPoint { name: name.to_owned(), position_m: Vector3::new(x_m, 0.0, 0.0) };
+        let point = |name: &str, x_m| NamedPoint::new(name, [x_m, 0.0, 0.0]);
         Rig {
             chucks: vec![point("A", 0.5), point("B", 0.7)],
             spheres: vec![point("1", 0.1)],

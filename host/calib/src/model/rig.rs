@@ -15,12 +15,15 @@ pub struct NamedPoint {
     pub name: String,
     /// Its centre, metres.
     pub position_m: Vector3<f64>,
+    /// How well each coordinate of the centre is known: its standard deviation, metres, zero where it is exact. `None` where nobody says.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub tolerance_m: Option<f64>,
 }
 
 impl NamedPoint {
     /// A chuck or a sphere at `position_m`, `(x, y, z)` in metres.
     pub fn new(name: impl Into<String>, position_m: [f64; 3]) -> Self {
-        Self { name: name.into(), position_m: Vector3::from(position_m) }
+        Self { name: name.into(), position_m: Vector3::from(position_m), tolerance_m: None }
     }
 }
 
@@ -32,6 +35,16 @@ pub struct PairingId {
     pub chuck: usize,
     /// Index into [`Rig::spheres`].
     pub sphere: usize,
+}
+
+impl PairingId {
+    /// Index of the chuck or of the sphere.
+    pub fn at(self, end: End) -> usize {
+        match end {
+            End::Chuck => self.chuck,
+            End::Sphere => self.sphere,
+        }
+    }
 }
 
 /// The telescoping bar.
@@ -67,6 +80,7 @@ pub struct Rig {
 
 /// Which end of the bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum End {
     /// On the table.
     Chuck,
@@ -172,7 +186,7 @@ fn check_points(end: End, points: &[NamedPoint]) -> Result<(), RigError> {
     if points.is_empty() {
         return Err(RigError::Empty(end));
     }
-    for (i, NamedPoint { name, position_m }) in points.iter().enumerate() {
+    for (i, NamedPoint { name, position_m, .. }) in points.iter().enumerate() {
         if points[..i].iter().any(|other| other.name == *name) {
             return Err(RigError::Duplicate { end, name: name.clone() });
         }

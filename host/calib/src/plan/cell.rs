@@ -1,6 +1,6 @@
 //! A robot at its rig, and everything that a pose is judged by.
 
-use ballbar::{JointKind, JointVector, Kinematics, MAX_PARAMETERS, Pairing, Parameter};
+use ballbar::{JointKind, JointVector, Kinematics, LANES, LengthRows, MAX_PARAMETERS, Measurement, Pairing, Parameter, Quantity};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -8,9 +8,9 @@ use rand_distr::{Distribution, StandardNormal};
 use super::contact::Nearest;
 use super::fixtures::{FixturesOverlap, check_fixtures};
 use super::scene::Scene;
-use crate::identify::plausible_error;
 use crate::kinematics::{InverseKinematics, Posture};
 use crate::model::{PairingId, Rig, Robot};
+use crate::unknowns::plausible_error;
 
 /// What has to be left at every pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -186,16 +186,24 @@ impl<'a> Cell<'a> {
     /// The bar's length, and how far plausible robots may be off it, metres.
     pub fn length(&self, q: &JointVector<f64>, pairing: &Pairing<f64>) -> (f64, f64) {
         let mut row = [0.0; MAX_PARAMETERS];
-        let length_m = self.kinematics.length_gradient(q, pairing, &mut row);
+        let length_m = self.kinematics.gradient(Quantity::Length, q, pairing, &mut row).value_m;
         let square: f64 = row.iter().zip(&self.deviations).map(|(entry, deviation)| (entry * deviation).powi(2)).sum();
         (length_m, RESERVED_DEVIATIONS * square.sqrt())
     }
 
-    /// The gradient of the length, each entry times the parameter's plausible deviation: metres.
-    pub fn plausible_row(&self, q: &JointVector<f64>, pairing: &Pairing<f64>) -> Vec<f64> {
-        let mut row = [0.0; MAX_PARAMETERS];
-        self.kinematics.length_gradient(q, pairing, &mut row);
-        row.iter().zip(&self.scales).map(|(entry, scale)| entry * scale).collect()
+    /// The gradient of the length at each of some joint vectors, entries times the parameters' plausible deviations: metres.
+    pub fn plausible_rows(&self, all_q: &[JointVector<f64>], pairing: &Pairing<f64>) -> Vec<Vec<f64>> {
+        let mut swept = LengthRows::default();
+        let mut rows = Vec::with_capacity(all_q.len());
+        for block in all_q.chunks(LANES) {
+            let measurement = |&q: &JointVector<f64>| Measurement { pairing: *pairing, q, length_m: 0.0, weight: 1.0 };
+            let measurements: heapless::Vec<_, LANES> = block.iter().map(measurement).collect();
+            swept.compute(&self.kinematics, &measurements);
+            let row =
+                |lane: usize| self.scales.iter().enumerate().map(|(index, scale)| swept.chain(index)[lane] * scale).collect();
+            rows.extend((0..block.len()).map(row));
+        }
+        rows
     }
 
     /// What stays to the nearer end of the bar's travel, less what plausible robots may be off, metres.

@@ -54,7 +54,8 @@ pub(super) fn most_telling(parameters: usize, all: Vec<Vec<ShellRoads>>) -> Vec<
     const SWEEPS: usize = 5;
     let told_by = |roads: &ShellRoads| {
         let nodes = roads.one_per_crossing().into_iter();
-        information(nodes.map(|node| roads.nodes[node].row.as_slice()), parameters) / (NOISE_M * NOISE_M)
+        let rows: Vec<&[f64]> = nodes.map(|node| roads.nodes[node].row.as_slice()).collect();
+        information(&rows, parameters) / (NOISE_M * NOISE_M)
     };
     let each: Vec<Vec<DMatrix<f64>>> = all.iter().map(|families| families.iter().map(told_by).collect()).collect();
     let mut chosen = vec![0; all.len()];

@@ -187,8 +187,9 @@ impl<'a, 'c> Growth<'a, 'c> {
         if found.postures.is_empty() {
             self.roads.hindrances.insert(index, found.hindrance());
         }
-        let row = |q: &JointVector<f64>| self.cell.plausible_row(q, &self.roads.shell.pairing);
-        let mut nodes: Vec<Node> = found.postures.into_iter().map(|q| Node { crossing: Some(index), row: row(&q), q }).collect();
+        let rows = self.cell.plausible_rows(&found.postures, &self.roads.shell.pairing);
+        let mut nodes: Vec<Node> =
+            found.postures.into_iter().zip(rows).map(|(q, row)| Node { crossing: Some(index), row, q }).collect();
         let tries = if self.home.is_some() { self.nearest_first(&mut nodes) } else { FIRST_CHOICES.min(nodes.len()) };
         let novelty = |node: &Node| self.experience.novelty(&node.row);
         let sortable = if self.home.is_some() { tries } else { nodes.len() };

@@ -53,7 +53,8 @@ fn greedy(all: &DMatrix<f64>, count: usize) -> Vec<usize> {
 /// Tries to exchange each chosen row, the least telling first, for the best of the others; whether any was.
 fn exchange_pass(rows: &[Vec<f64>], all: &DMatrix<f64>, chosen: &mut [usize]) -> bool {
     const LEAST_GAIN: f64 = 1e-6;
-    let told = information(chosen.iter().map(|&i| rows[i].as_slice()), all.nrows());
+    let of_chosen: Vec<&[f64]> = chosen.iter().map(|&i| rows[i].as_slice()).collect();
+    let told = information(&of_chosen, all.nrows());
     let Some(mut inverse) = told.cholesky().map(|factor| factor.inverse()) else { return false };
     let mut is_chosen = vec![false; all.ncols()];
     chosen.iter().for_each(|&i| is_chosen[i] = true);

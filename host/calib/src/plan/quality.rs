@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cell::plausible_deviation;
 use super::experience::NOISE_M;
-use super::information::information;
+use super::information::information_of;
 use crate::identify::{Identifiability, Observation, Spectrum};
 use crate::model::JointLimits;
 use crate::units::mm_from_m;
@@ -71,17 +71,10 @@ impl Quality {
     /// Judges poses over a subset of the parameters; `None` when they do not tell all of it.
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], subset: &[usize]) -> Option<Self> {
         const MM: f64 = 1e3;
-        let kinematics = Kinematics::new(chain);
         let scales: Vec<f64> =
             subset.iter().map(|&index| MM * plausible_deviation(chain.unit(Parameter::from_index(index)))).collect();
-        let scaled_row = |measurement: &Measurement<f64>| -> Vec<f64> {
-            let mut row = [0.0; MAX_PARAMETERS];
-            kinematics.residual_row(measurement, &mut row);
-            subset.iter().zip(&scales).map(|(&index, scale)| row[index] * scale).collect()
-        };
-        let rows: Vec<Vec<f64>> = measurements.iter().map(scaled_row).collect();
         let count = subset.len();
-        let eigen = information(rows.iter().map(Vec::as_slice), count).symmetric_eigen();
+        let eigen = information_of(chain, measurements, subset, &scales).symmetric_eigen();
         let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
         // Below this an eigenvalue of JᵀJ is rounding.
         if count == 0 || least <= 1e-13 * most {
@@ -189,15 +182,13 @@ fn amplification(chain: &Chain<f64>, limits: &[JointLimits], subset: &[usize], s
     const POSES: usize = 200;
     let kinematics = Kinematics::new(chain);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut row = [0.0; MAX_PARAMETERS];
+    let mut rows = [[0.0; MAX_PARAMETERS]; 3];
     let mut sum = 0.0;
     for _ in 0..POSES {
         let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
         let Ok(q) = chain.joint_vector(&q) else { continue };
-        let origin_m = kinematics.base_from_tool(&q).translation_m;
-        for axis in 0..3 {
-            let force = Vector3::ith(axis, 1.0);
-            kinematics.wrench_columns(&q, force, origin_m.cross(&force), &mut row);
+        kinematics.position_gradient(&q, &Vector3::zeros(), &mut rows);
+        for row in &rows {
             let column = DVector::from_iterator(subset.len(), subset.iter().zip(scales).map(|(&i, scale)| row[i] * scale));
             sum += column.dot(&(covariance * &column));
         }

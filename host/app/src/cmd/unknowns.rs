@@ -1,0 +1,29 @@
+//! What a fit finds out beside the robot: `--unknown`.
+
+use ballbar_calib::model::{Dataset, Rig};
+use ballbar_calib::unknowns::{AnyBlock, Kind};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+use super::outcome::CommandError;
+use crate::remedies::Remedied;
+
+#[derive(Args)]
+pub(super) struct UnknownArgs {
+    /// What is not known beside the robot and is found out with it: the zero of the bar or of each rod, the bar's gain or latency, where
+    /// chucks and spheres are (within `tolerance_mm` of the rig file), an offset of each set
+    #[arg(long, value_name = "KIND,…", value_delimiter = ',', value_parser = kinds())]
+    unknown: Vec<Kind>,
+}
+
+fn kinds() -> impl TypedValueParser<Value = Kind> {
+    PossibleValuesParser::new(Kind::ALL.map(Kind::name)).try_map(|name| Kind::named(&name).ok_or("no kind of unknowns"))
+}
+
+impl UnknownArgs {
+    /// The unknowns that these poses have of each kind, kinds that stand twice once.
+    pub(super) fn blocks(&self, rig: &Rig, dataset: &Dataset) -> Result<Vec<AnyBlock>, CommandError> {
+        let asked = Kind::ALL.into_iter().filter(|kind| self.unknown.contains(kind));
+        Ok(asked.map(|kind| kind.block(rig, dataset).map_err(Remedied)).collect::<Result<_, _>>()?)
+    }
+}

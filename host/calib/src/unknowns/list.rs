@@ -1,0 +1,110 @@
+//! The kinds of unknowns that there are beside a chain's: the one list to add to.
+
+use thiserror::Error;
+
+use super::{BarZero, Block, Gain, Latency, RigBlock, RodZeros, SetOffsets};
+use crate::model::{Dataset, Rig};
+
+/// A kind of unknowns that a fit may be asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Kind {
+    /// By how much all lengths are too long.
+    BarZero,
+    /// By how much each rod makes lengths too long.
+    RodZeros,
+    /// By which part displacements are shown too large.
+    BarGain,
+    /// By how much the LVDT's signal comes late.
+    Latency,
+    /// Where chucks and spheres are, within their tolerances.
+    Rig,
+    /// By how much the lengths of each set are too long.
+    Sets,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 6] = [Self::BarZero, Self::RodZeros, Self::BarGain, Self::Latency, Self::Rig, Self::Sets];
+
+    /// What it is called: `bar-zero`, `rod-zeros`, `bar-gain`, `latency`, `rig`, `sets`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BarZero => "bar-zero",
+            Self::RodZeros => "rod-zeros",
+            Self::BarGain => "bar-gain",
+            Self::Latency => "latency",
+            Self::Rig => "rig",
+            Self::Sets => "sets",
+        }
+    }
+
+    /// The kind of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// The unknowns of this kind that a dataset has.
+    ///
+    /// # Errors
+    /// [`UnknownError`] when it has none.
+    pub fn block(self, rig: &Rig, dataset: &Dataset) -> Result<AnyBlock, UnknownError> {
+        Ok(match self {
+            Self::BarZero => AnyBlock::BarZero(BarZero),
+            Self::RodZeros => AnyBlock::RodZeros(RodZeros::new(rig, dataset)),
+            Self::BarGain => AnyBlock::Gain(Gain::new(rig, dataset)?),
+            Self::Latency => AnyBlock::Latency(Latency::new(dataset)?),
+            Self::Rig => AnyBlock::Rig(RigBlock::new(rig, dataset)?),
+            Self::Sets => AnyBlock::Sets(SetOffsets::new(dataset)?),
+        })
+    }
+}
+
+/// Unknowns of one of the kinds.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum AnyBlock {
+    /// [`Kind::BarZero`].
+    BarZero(BarZero),
+    /// [`Kind::RodZeros`].
+    RodZeros(RodZeros),
+    /// [`Kind::BarGain`].
+    Gain(Gain),
+    /// [`Kind::Latency`].
+    Latency(Latency),
+    /// [`Kind::Rig`].
+    Rig(RigBlock),
+    /// [`Kind::Sets`].
+    Sets(SetOffsets),
+}
+
+impl AnyBlock {
+    pub(super) fn as_block(&self) -> &dyn Block {
+        match self {
+            Self::BarZero(block) => block,
+            Self::RodZeros(block) => block,
+            Self::Gain(block) => block,
+            Self::Latency(block) => block,
+            Self::Rig(block) => block,
+            Self::Sets(block) => block,
+        }
+    }
+}
+
+/// Why measurements have no unknowns of some kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum UnknownError {
+    /// Every chuck and sphere in use is known exactly, or nobody says how well.
+    #[error("no chuck or sphere of the rig has a tolerance")]
+    NoTolerance,
+    /// The rig has no bar, and rows say nothing of theirs.
+    #[error("nothing says how long the bar is at mid travel")]
+    NoRods,
+    /// No length changed while it was measured.
+    #[error("no length was measured in motion")]
+    NoMotion,
+    /// No row belongs to a set.
+    #[error("no row names a set")]
+    NoSets,
+}
