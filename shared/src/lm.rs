@@ -68,7 +68,7 @@ pub enum ConvergenceTest {
     /// The last step lowered, and the next one would lower, the cost by less than 1e-12 of it (`f32`: 1e-6); or the next one promises
     /// less than ten times that, or than rounding of the residuals makes of the cost, and does not lower it.
     Cost,
-    /// The next step would change what is computed by less than 1e-12 m RMS, a picometre (`f32`: 1.2 nm).
+    /// The next step changes what is computed by less than 1e-12 m RMS, a picometre (`f32`: 1.2 nm).
     Step,
 }
 
@@ -180,8 +180,9 @@ impl<S: Real> Tolerances<S> {
             // Below a nanometre residuals are the rounding of a file's digits, and a start that has them is the minimum already.
             rounded_rms_m: at_least(1e-9, ulps(1.0)),
             zero_column: at_least(1e-24, ulps(8.0) * ulps(8.0)),
-            first_lambda: root(root(S::EPSILON)) * root(root(root(S::EPSILON))),
-            smallest_lambda: root(S::EPSILON) * root(root(S::EPSILON)),
+            // 1e-6 and 9e-13; in f32 1.9e-3 and 3e-6.
+            first_lambda: S::nearest(0.75) * root(root(S::EPSILON)) * root(root(root(S::EPSILON))),
+            smallest_lambda: S::nearest(0.5) * root(S::EPSILON) * root(root(S::EPSILON)),
             largest_lambda: S::nearest(1e12),
         }
     }
@@ -291,8 +292,19 @@ impl<S: Real, P: Problem<S>, F: FnMut(S)> Descent<'_, S, P, F> {
         self.lambda <= self.tolerances.largest_lambda
     }
 
-    fn minimum(&self, test: ConvergenceTest) -> Status {
-        if self.steps > 0 { Status::Converged(test) } else { Status::AlreadyOptimal }
+    /// Ends at a minimum, with a last step that is too small to be seen in the cost: it still brings weakly excited unknowns nearer. A
+    /// start that moved nothing stays as it is.
+    fn minimum(&mut self, test: ConvergenceTest) -> Status {
+        if self.steps == 0 {
+            return Status::AlreadyOptimal;
+        }
+        self.lambda = self.tolerances.smallest_lambda;
+        if let Some((candidate, promised)) = self.step()
+            && promised <= S::nearest(10.0) * self.tolerances.cost.max(self.rounded_cost()) * self.equations.cost()
+        {
+            self.values = candidate;
+        }
+        Status::Converged(test)
     }
 
     /// Part of the cost that is rounding of the residuals.

@@ -29,7 +29,7 @@ fn apart(puma: &Puma, per_pairing: usize) -> (f64, f64) {
     (apart_mm, mega)
 }
 
-/// Measured: 3e-5 mm and 1e-4 mm, in some seconds of the shipped board.
+/// Measured: 5.2e-4 mm in 3 million instructions and 1.6e-4 mm in 20 million.
 #[test]
 fn a_fit_on_the_board_is_that_of_the_host() {
     if is_skipped() {
