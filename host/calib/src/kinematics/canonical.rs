@@ -16,11 +16,12 @@ mod returning;
 
 use std::f64::consts::{PI, TAU};
 
-use ballbar::{Chain, JointKind, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Pose, Vector3};
+use ballbar::{Chain, Joint, JointKind, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Pose, Vector3};
 use nalgebra::DMatrix;
 
 use self::returning::UserFrames;
 use super::frames::{compose, from_link, link_angles, link_angles_about};
+use super::skeleton::Axis;
 
 /// A robot in canonical frames, and the way back to the frames it was written in.
 ///
@@ -49,6 +50,7 @@ pub struct CanonicalFrames {
     user: UserFrames,
     /// What the way back makes of the canonical chain: the user's own, but for rounding.
     returned: Chain<f64>,
+    own: UserFrames,
 }
 
 /// Sine of the angle below which two axes count as nearly parallel: 11.5°, which no robot is designed with.
@@ -60,12 +62,29 @@ impl CanonicalFrames {
         let canonical = canonical(chain);
         let user = UserFrames::of(chain);
         let returned = user.of_chain(&canonical);
-        Self { canonical, user, returned }
+        Self { user, returned, own: UserFrames::of(&canonical), canonical }
     }
 
     /// The same robot in canonical frames: the same pose at all encoder outputs, to rounding.
     pub fn chain(&self) -> &Chain<f64> {
         &self.canonical
+    }
+
+    /// The same with lengths in whole nanometres and angles in whole 2⁻³³ of a turn (0.7 nrad): the same bits however the robot is written,
+    /// unless a value lies at the edge of a step, for what would otherwise hang on the last bit of a comparison.
+    pub fn rounded_chain(&self) -> Chain<f64> {
+        const STEPS_PER_METRE: f64 = 1e9;
+        const STEPS_PER_TURN: f64 = 8_589_934_592.0;
+        let mut rounded = self.canonical.clone();
+        for (index, value) in rounded.parameters_mut().iter_mut().enumerate() {
+            // Without the sign of a zero.
+            *value = match index % PARAMETERS_PER_JOINT {
+                0..3 => (*value * STEPS_PER_METRE).round() / STEPS_PER_METRE + 0.0,
+                3..6 => (*value / TAU * STEPS_PER_TURN).round() / STEPS_PER_TURN * TAU + 0.0,
+                _ => *value,
+            };
+        }
+        rounded
     }
 
     /// A chain of the same joints, in any frames, as the user writes it: the same robot to rounding, its redundant parameters (those of
@@ -81,6 +100,16 @@ impl CanonicalFrames {
     pub fn in_user_frames(&self, chain: &Chain<f64>) -> Chain<f64> {
         assert_eq!(chain.joint_kinds(), self.canonical.joint_kinds(), "a chain of the same joints");
         self.user.moved_from(&self.returned, &self.user.of_chain(chain))
+    }
+
+    /// A chain of the same joints, in any frames, as it is in these canonical ones: the same robot to rounding, its redundant parameters those
+    /// of [`CanonicalFrames::chain`]. So two robots are compared, such as a design and what was fitted to it.
+    ///
+    /// # Panics
+    /// When the chain's joints are not these.
+    pub fn in_canonical_frames(&self, chain: &Chain<f64>) -> Chain<f64> {
+        assert_eq!(chain.joint_kinds(), self.canonical.joint_kinds(), "a chain of the same joints");
+        self.own.of_chain(chain)
     }
 
     /// `∂user/∂canonical` at a chain in (nearly) canonical frames: P × P for P parameters, SI units, by which a covariance comes to the
@@ -110,13 +139,13 @@ impl CanonicalFrames {
 }
 
 /// Poses of the joints' frames, before each joint's motion, and behind them that of the tool, at encoders zero: base frame.
-struct AtZero {
+pub(super) struct AtZero {
     frames: Vec<Pose<f64>>,
-    base_from_tool: Pose<f64>,
+    pub(super) base_from_tool: Pose<f64>,
 }
 
 impl AtZero {
-    fn of(chain: &Chain<f64>) -> Self {
+    pub(super) fn of(chain: &Chain<f64>) -> Self {
         let mut base_from_last = from_link(Vector3::zeros(), [0.0; 3]);
         let mut frames = Vec::new();
         for i in 0..=chain.joints() {
@@ -132,6 +161,18 @@ impl AtZero {
         Self { frames, base_from_tool: base_from_last }
     }
 
+    /// The joints' axes through the origins that the chain gives them.
+    pub(super) fn axes(&self, chain: &Chain<f64>) -> Vec<Axis> {
+        let joints = (0..chain.joints()).filter_map(|i| chain.joint(i)).zip(&self.frames);
+        let axis = |(joint, frame): (Joint<f64>, &Pose<f64>)| Axis {
+            kind: joint.kind,
+            point_m: frame.translation_m,
+            direction: frame.rotation.column(2).into(),
+            scale: joint.scale,
+        };
+        joints.map(axis).collect()
+    }
+
     fn direction(&self, joint: usize) -> Vector3<f64> {
         self.frames[joint].rotation.column(2).into()
     }
@@ -145,7 +186,8 @@ fn joint_at_zero(kind: JointKind, offset: f64) -> Pose<f64> {
     }
 }
 
-fn canonical(chain: &Chain<f64>) -> Chain<f64> {
+/// The same robot in canonical frames.
+pub(super) fn canonical(chain: &Chain<f64>) -> Chain<f64> {
     let zero = AtZero::of(chain);
     let origins_m = origins(chain.joint_kinds(), &zero);
     let mut written = chain.clone();
