@@ -16,6 +16,7 @@ pub mod exports;
 pub mod f405_emulator;
 pub mod fake_board;
 pub mod fake_hardware;
+pub mod frames;
 pub mod naive;
 pub mod parameter_sets;
 pub mod peers;

@@ -137,8 +137,17 @@ fn range(gaps: impl Iterator<Item = f64>) -> (f64, f64) {
 /// Motion cannot change a gap that differs by less.
 const CONSTANT: f64 = 5e-3;
 
-/// Where each link begins, behind the joint before it; then the tool.
-fn frames(chain: &Chain<f64>, q: &[f64]) -> Vec<(Isometry3<f64>, V, Isometry3<f64>)> {
+/// Of a link where it begins, behind the joint before it, and where it ends, before the joint behind it or at the tool.
+type Frames = (Isometry3<f64>, V, Isometry3<f64>);
+
+/// Where the way along the links comes to an axis, and where it leaves it, at encoders zero; both at the base's origin for the first link.
+struct Turns {
+    comes: V,
+    leaves: V,
+}
+
+/// Of all links.
+fn frames(chain: &Chain<f64>, q: &[f64]) -> Vec<Frames> {
     let mut frame = Isometry3::identity();
     let mut frames = Vec::new();
     for i in 0..=chain.joints() {
@@ -308,23 +317,52 @@ impl<'a> NaiveCell<'a> {
         solids
     }
 
-    /// A slide from where it comes from; then the link itself: along the joint's axis and across to the next joint, or straight.
-    fn links(&self, frames: &[(Isometry3<f64>, V, Isometry3<f64>)]) -> Vec<Solid> {
-        const SHORT: f64 = 0.010;
+    /// The frames at encoders zero, and where the links' ways turn there: from the tool inwards an axis is left at its point nearest to where
+    /// the next one is, a slide where the next axis is left; it is come to at its point nearest to where the one before is left.
+    fn turns(&self) -> (Vec<Frames>, Vec<Turns>) {
+        let joints = self.robot.chain.joints();
+        let zero = frames(&self.robot.chain, &vec![0.0; joints]);
+        let foot = |joint: usize, point: V| {
+            let (through, along) = (zero[joint].2.translation.vector, zero[joint].2 * V::z());
+            through + along * along.dot(&(point - through))
+        };
+        let mut leaves = vec![V::zeros(); joints + 1];
+        let mut next = zero[joints].2.translation.vector;
+        for joint in (0..joints).rev() {
+            if self.robot.chain.joint_kinds()[joint] == JointKind::Revolute {
+                next = foot(joint, next);
+            }
+            leaves[joint + 1] = next;
+        }
+        // Whatever the line of a slide, it goes through where it is left.
+        let comes = |link: usize| match link.checked_sub(1) {
+            None => V::zeros(),
+            Some(joint) => {
+                let along = zero[joint].2 * V::z();
+                leaves[link] + along * along.dot(&(leaves[joint] - leaves[link]))
+            }
+        };
+        let turns = (0..=joints).map(|link| Turns { comes: comes(link), leaves: leaves[link] }).collect();
+        (zero, turns)
+    }
+
+    /// A slide from where it comes from; then the link itself: along the joint's axis and across to the next one.
+    fn links(&self, frames: &[Frames]) -> Vec<Solid> {
         let sizes = &self.rig.solids;
+        let short = 0.4 * sizes.link_radius_m;
+        let (zero, turns) = self.turns();
+        // What stands before or behind a joint at encoders zero goes where its frame goes.
+        let moved =
+            |now: &Isometry3<f64>, before: &Isometry3<f64>, point: &V| (now * before.inverse() * Point3::from(*point)).coords;
         let mut lines: Vec<(usize, V, V)> = Vec::new();
-        for (link, (start, translation, end)) in frames.iter().enumerate() {
-            let corner = (start * Point3::new(0.0, 0.0, translation.z)).coords;
-            let (start, end) = (start.translation.vector, end.translation.vector);
+        for (link, now) in frames.iter().enumerate() {
+            let [start, corner] = [turns[link].comes, turns[link].leaves].map(|point| moved(&now.0, &zero[link].0, &point));
+            let end = turns.get(link + 1).map_or(now.2.translation.vector, |next| moved(&now.2, &zero[link].2, &next.comes));
             if link > 0 && self.robot.chain.joint_kinds()[link - 1] == JointKind::Prismatic {
-                lines.push((link, frames[link - 1].2.translation.vector, start));
+                lines.push((link, moved(&frames[link - 1].2, &zero[link - 1].2, &turns[link].comes), start));
             }
-            let (along, across) = (translation.z.abs(), translation.x.hypot(translation.y));
-            if along >= SHORT && across >= SHORT {
-                lines.extend([(link, start, corner), (link, corner, end)]);
-            } else if along.hypot(across) >= SHORT {
-                lines.push((link, start, end));
-            }
+            let parts = [(link, start, corner), (link, corner, end)];
+            lines.extend(parts.into_iter().filter(|(_, from, to)| (to - from).norm() > short));
         }
         let last = lines[lines.len() - 1].0;
         let count = lines.len();

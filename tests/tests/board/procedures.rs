@@ -5,14 +5,19 @@ use std::num::NonZeroUsize;
 
 use ballbar::LvdtCurve;
 use ballbar::wire::{Answer, Command};
+use ballbar_calib::model::Robot;
+use ballbar_tests::data::real_data;
+use ballbar_tests::frames::rewritten;
 use ballbar_tests::scenarios;
 use host_cal::board::{
     Admission, BAUD, BoardLink, HomeError, Homing, LvdtError, LvdtOrigin, LvdtPoint, RobotOnBoard, Upload, UploadError,
-    UploadStep, fit_lvdt, store_lvdt,
+    UploadStep, fit_lvdt, nominal_lvdt, parameter_set, store_lvdt,
 };
 use host_cal::collect::{CheckedBoard, CollectError};
 use host_cal::files::open_robot;
 use host_cal::virtual_board::{Pace, VirtualBoard, VirtualBoardOptions};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 const VECTORS: NonZeroUsize = NonZeroUsize::new(20).unwrap();
 
@@ -52,6 +57,36 @@ fn a_design_is_uploaded_only_where_that_is_said_and_compared_before_it_is_stored
     assert_eq!(steps[0], UploadStep::NominalLvdt);
     assert_eq!(steps[1..], [UploadStep::Compared; VECTORS.get()]);
     assert_eq!(uploaded.difference.vectors, VECTORS.get());
+}
+
+#[test]
+fn frames_half_a_kilometre_away_cost_a_board_no_precision() {
+    let Some(folder) = real_data("cases/far_frames") else { return };
+    let [near, far] = ["near.toml", "far2.toml"].map(|name| Robot {
+        // A UR5 says nothing of its encoders: those of six other joints will do.
+        encoders: open_robot("puma560").unwrap().encoders,
+        ..open_robot(folder.join(name).to_str().unwrap()).unwrap()
+    });
+    let (board, mut link) = empty_board();
+    let mut put = |robot| Upload::new(robot, Admission::Any, VECTORS).unwrap().put(&mut link, &mut |_| ()).unwrap();
+    for robot in [&near, &far] {
+        let difference = put(robot).difference;
+        assert!(difference.position_m < 1e-6 && difference.axis_rad < 1.5e-6, "{difference:?}");
+    }
+    // Whoever has the same robot in other frames may collect with this board.
+    let again = || BoardLink::connect(board.port(), BAUD).unwrap();
+    Homing::begin(&mut again()).unwrap().at(&[0.0; 6], None).unwrap();
+    assert!(CheckedBoard::read(again(), &near).is_ok() && CheckedBoard::read(again(), &far).is_ok());
+}
+
+#[test]
+fn a_board_is_told_the_same_of_the_same_robot() {
+    let design = open_robot("puma560").unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let other = Robot { chain: rewritten(&design.chain, 100.0, &mut rng), ..design.clone() };
+    let told = |robot| parameter_set(robot, nominal_lvdt(0.075)).unwrap();
+    let parameters = [told(&design), told(&other)].map(|set| set.parameters);
+    assert!(parameters[0].iter().zip(&parameters[1]).all(|(a, b)| (a - b).abs() < 1e-7), "{parameters:?}");
 }
 
 #[test]

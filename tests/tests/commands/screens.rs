@@ -120,7 +120,7 @@ fn a_lost_port_is_shown_and_can_be_left() {
 fn a_port_lost_while_collecting_leaves_the_reason_on_a_sane_terminal() {
     let mut cell = SimulatedCell::start(plant(1), 0.0, &SHORT_PLAN);
     let mut run = collect(&cell, "sim");
-    run.wait_for("2/25 line");
+    run.wait_for("2/24 line");
     let other = board(&cell.path(""));
     drop(std::mem::replace(&mut cell.board, other));
     let (code, text) = run.finish();
@@ -154,7 +154,7 @@ fn a_terminal_that_can_draw_nothing_gets_lines() {
 fn collect_hears_keys_and_says_what_happens() {
     let cell = SimulatedCell::start(plant(1), 0.0, &SHORT_PLAN);
     let mut run = collect(&cell, "sim");
-    run.wait_for("2/25 line");
+    run.wait_for("2/24 line");
     run.press("p");
     run.wait_for("> paused: r to go on");
     run.press("e");
@@ -162,7 +162,7 @@ fn collect_hears_keys_and_says_what_happens() {
     run.press("x");
     run.press("r");
     run.wait_for("going on");
-    run.wait_for("4/25 line");
+    run.wait_for("4/24 line");
     run.press("q");
     let (code, text) = run.finish();
     assert_eq!(code, 1, "{text}");
@@ -184,5 +184,5 @@ fn collect_asks_for_the_bar_and_for_the_place() {
     run.press("\u{3}");
     let (code, text) = run.finish();
     assert_eq!(code, 1, "{text}");
-    assert!(text.contains("0 of 25 planned poses are measured"), "{text}");
+    assert!(text.contains("0 of 24 planned poses are measured"), "{text}");
 }

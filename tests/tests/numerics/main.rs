@@ -2,6 +2,7 @@
 
 mod assessments;
 mod built_in_robots;
+mod canonical_frames;
 mod designs;
 mod golden;
 mod gradients;

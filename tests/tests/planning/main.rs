@@ -4,3 +4,4 @@ mod chosen_poses;
 mod inverse_kinematics;
 mod planned_ways;
 mod planning;
+mod rewritten_frames;

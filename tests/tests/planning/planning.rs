@@ -58,7 +58,7 @@ fn a_plan_that_no_fit_could_use_says_so() {
     let bench = Workbench::new();
     let plan = |more: &[&str]| bench.run(&[&PLAN[..], more, &["--out", "plan.csv", "--json"]].concat());
     let cases: [(&[&str], &str); 4] = [
-        (&["--pairings", "A:1,B:2,C:3", "--per-pair", "13", "--latitudes-deg", "20,70"], "noise of the lengths reaches the tool"),
+        (&["--pairings", "A:1,B:2,C:3", "--per-pair", "13", "--latitudes-deg", "30,60"], "noise of the lengths reaches the tool"),
         (&["--per-pair", "3", "--latitudes-deg", "45"], "27 poses for 36 parameters"),
         (&["--per-pair", "4", "--latitudes-deg", "30,60"], "36 poses for 36 parameters"),
         (&["--pairings", "A:1,A:2", "--per-pair", "20"], "identify 32 of 36 parameters"),

@@ -2,6 +2,7 @@
 
 use ballbar::wire::{Answer, Command, ParameterSet, Refusal, Status, WhichSet};
 use ballbar::{Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose};
+use ballbar_calib::kinematics::CanonicalFrames;
 use ballbar_calib::model::Robot;
 use miette::Diagnostic;
 use thiserror::Error;
@@ -30,6 +31,9 @@ pub enum SetError {
 
 /// The parameters of a robot's file, rounded to the board's f32, with an LVDT curve.
 ///
+/// The board is told the robot in canonical frames: those of a file may lie half a kilometre away, where single precision has steps of
+/// 30 µm. What it computes is the same.
+///
 /// # Errors
 /// [`SetError`] when the file lacks encoders, or the board could not use it.
 pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, SetError> {
@@ -40,7 +44,7 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
         name: cut_to(&robot.name, 32),
         is_calibrated: robot.standing().is_calibrated(),
         kinds: robot.chain.joint_kinds().iter().copied().collect(),
-        parameters: robot.chain.parameters().iter().map(|&value| value as f32).collect(),
+        parameters: CanonicalFrames::new(&robot.chain).chain().parameters().iter().map(|&value| value as f32).collect(),
         encoders: encoders
             .map(|e| Encoder { counts_per_unit: e.counts_per_unit as f32, counts_per_index: e.counts_per_index })
             .collect(),

@@ -13,12 +13,13 @@
 //! Before the first row and behind the last one stand whole transforms, so that any chain has a table. Where two other axes are
 //! nearly parallel their common normal is far away, and d of both runs away with it.
 
-use ballbar::{Chain, JointKind, JointVector, Kinematics, Matrix3, Pose, Vector3};
+use ballbar::{Chain, JointKind, Kinematics, Matrix3, Pose, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::canonical::AtZero;
 use super::frames::{apart, compose, from_link, inverse};
-use super::skeleton::{Axis, Skeleton};
+use super::skeleton::Axis;
 use crate::model::JointLimits;
 
 /// Below this angle, radians, axes are taken as parallel: what a file's decimals leave of a right angle.
@@ -99,13 +100,13 @@ struct Normal {
 impl DhTable {
     /// The table of a chain.
     pub fn new(chain: &Chain<f64>, convention: Convention) -> Self {
-        let posture = Skeleton::new(chain).at(&JointVector::zero());
-        let mut axes = posture.axes().to_vec();
+        let zero = AtZero::of(chain);
+        let mut axes = zero.axes(chain);
         let mut far = nearly_parallel(&axes);
         bring_near(&mut axes, 0, &Vector3::zeros(), &mut far);
         let Some(first) = axes.first() else {
             let nothing = from_link(Vector3::zeros(), [0.0; 3]);
-            let ends = (nothing, posture.base_from_tool);
+            let ends = (nothing, zero.base_from_tool);
             return Self {
                 convention,
                 base_from_first: ends.0,
@@ -125,7 +126,7 @@ impl DhTable {
             convention,
             base_from_first: begin.frame(&axes[0].direction),
             rows: Vec::new(),
-            last_from_tool: posture.base_from_tool,
+            last_from_tool: zero.base_from_tool,
             nearly_parallel: far,
         };
         table.with_rows(&axes, begin, &normals).closed()

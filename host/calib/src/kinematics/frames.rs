@@ -26,7 +26,11 @@ pub fn from_link(translation_m: Vector3<f64>, [alpha, beta, gamma]: [f64; 3]) ->
 /// Where beta is a right angle only alpha ± gamma is told. Whatever rounding makes of alpha there, beta and gamma are taken from what
 /// it leaves, so that the three always give the rotation back.
 pub fn link_angles(rotation: &Matrix3<f64>) -> [f64; 3] {
-    let alpha = rotation[(1, 0)].atan2(rotation[(0, 0)]);
+    link_angles_about(rotation, rotation[(1, 0)].atan2(rotation[(0, 0)]))
+}
+
+/// The angles of a rotation whose alpha is known, half a turn from [`link_angles`]' or not: beta is then beyond a right angle.
+pub(super) fn link_angles_about(rotation: &Matrix3<f64>, alpha: f64) -> [f64; 3] {
     let (sin, cos) = alpha.sin_cos();
     let beta = (-rotation[(2, 0)]).atan2(cos * rotation[(0, 0)] + sin * rotation[(1, 0)]);
     let row = |column: usize| cos * rotation[(1, column)] - sin * rotation[(0, column)];

@@ -4,6 +4,7 @@
 //! all joints, for solids and for Jacobians with respect to `q`, and the way back from a pose to joint vectors.
 
 mod branches;
+mod canonical;
 mod compensation;
 mod dh;
 mod frames;
@@ -12,6 +13,7 @@ mod opw;
 mod skeleton;
 
 pub use branches::{Branches, InverseKinematics, Thoroughness};
+pub use canonical::CanonicalFrames;
 pub use compensation::{Compensation, Compensator, FarTurn, Goal, NothingAllowed, Unreached};
 pub use dh::{Convention, DhRow, DhTable, NearlyParallel};
 pub use frames::{apart, compose, from_link, inverse, link_angles};

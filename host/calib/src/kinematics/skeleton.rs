@@ -1,11 +1,15 @@
-//! Origins, axes and ends of all links at one joint vector.
+//! Axes and links of a robot at one joint vector, whatever frames its file is written in.
 
 use ballbar::{Chain, Joint, JointKind, JointVector, MAX_JOINTS, Matrix3, Pose, Vector3};
-use nalgebra::Rotation3;
 
-/// A chain made ready for questions about its links.
+use super::canonical::canonical;
+use super::frames::from_link;
+
+/// A robot made ready for questions about its links: in canonical frames ([`super::CanonicalFrames`]), so that nothing here depends on
+/// where along its axis a frame was put.
 #[derive(Clone, Debug)]
 pub struct Skeleton {
+    chain: Chain<f64>,
     links: Vec<LinkTransform>,
     encoders: Vec<Joint<f64>>,
 }
@@ -14,6 +18,8 @@ pub struct Skeleton {
 struct LinkTransform {
     translation_m: Vector3<f64>,
     rotation: Matrix3<f64>,
+    /// Where the link's end comes to the next axis, by its height along that above the next origin; zero before the tool.
+    end_height_m: f64,
 }
 
 /// A joint's axis in the base frame.
@@ -65,17 +71,19 @@ impl Posture {
         &self.axes[..self.joints]
     }
 
-    /// Where link `link` starts, from 0: on the axis of the joint before it, behind that joint's motion.
+    /// Where link `link` starts, from 0: on the axis of the joint before it, behind that joint's motion, where the link before it comes to
+    /// that axis.
     pub fn start_m(&self, link: usize) -> Vector3<f64> {
         self.starts_m[link]
     }
 
-    /// Where link `link` turns away from the axis of the joint before it: its translation's z part from its start.
+    /// Where link `link` leaves the axis of the joint before it: at that joint's canonical origin, behind its motion.
     pub fn corner_m(&self, link: usize) -> Vector3<f64> {
         self.corners_m[link]
     }
 
-    /// Where link `link` ends: at the origin of the joint behind it, before that joint's motion, or of the tool.
+    /// Where link `link` ends: at the foot of the perpendicular from its corner on the next axis, before that joint's motion, or at the tool's
+    /// origin.
     pub fn end_m(&self, link: usize) -> Vector3<f64> {
         self.ends_m[link]
     }
@@ -89,14 +97,23 @@ impl Posture {
 impl Skeleton {
     /// Prepares a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
-        let link = |link: ballbar::Link<f64>| LinkTransform {
-            translation_m: link.translation_m,
-            rotation: Rotation3::from_euler_angles(link.gamma_rad, link.beta_rad, link.alpha_rad).into_inner(),
+        let chain = canonical(chain);
+        let link = |i: usize| {
+            let link = chain.link(i)?;
+            let Pose { rotation, translation_m } = from_link(link.translation_m, [link.alpha_rad, link.beta_rad, link.gamma_rad]);
+            let end_height_m = if i < chain.joints() { -translation_m.dot(&rotation.column(2)) } else { 0.0 };
+            Some(LinkTransform { translation_m, rotation, end_height_m })
         };
         Self {
-            links: (0..=chain.joints()).filter_map(|i| chain.link(i)).map(link).collect(),
+            links: (0..=chain.joints()).filter_map(link).collect(),
             encoders: (0..chain.joints()).filter_map(|i| chain.joint(i)).collect(),
+            chain,
         }
+    }
+
+    /// The robot in canonical frames.
+    pub fn chain(&self) -> &Chain<f64> {
+        &self.chain
     }
 
     /// Number of joints.
@@ -104,12 +121,12 @@ impl Skeleton {
         self.encoders.len()
     }
 
-    /// The joints' encoder models.
+    /// The joints' encoder models, of canonical frames: without offsets.
     pub fn encoders(&self) -> &[Joint<f64>] {
         &self.encoders
     }
 
-    /// Translation of link `link`, from 0, in the frame before it, metres.
+    /// Translation of link `link`, from 0, in the canonical frame before it, metres.
     ///
     /// # Panics
     /// When there is no such link.
@@ -129,14 +146,16 @@ impl Skeleton {
             base_from_tool: Pose { rotation: Matrix3::identity(), translation_m: Vector3::zeros() },
         };
         let (mut rotation, mut origin_m) = (Matrix3::identity(), Vector3::zeros());
+        let mut start_height_m = 0.0;
         for (i, link) in self.links.iter().enumerate() {
-            posture.starts_m[i] = origin_m;
-            posture.corners_m[i] = origin_m + rotation.column(2) * link.translation_m.z;
+            posture.starts_m[i] = origin_m + rotation.column(2) * start_height_m;
+            posture.corners_m[i] = origin_m;
             origin_m += rotation * link.translation_m;
-            posture.ends_m[i] = origin_m;
             rotation *= link.rotation;
-            let Some(encoder) = self.encoders.get(i) else { continue };
             let direction: Vector3<f64> = rotation.column(2).into();
+            posture.ends_m[i] = origin_m + direction * link.end_height_m;
+            start_height_m = link.end_height_m;
+            let Some(encoder) = self.encoders.get(i) else { continue };
             posture.axes[i] = Axis { kind: encoder.kind, point_m: origin_m, direction, scale: encoder.scale };
             let theta = encoder.offset + encoder.scale * q.as_array()[i];
             match encoder.kind {

@@ -1,6 +1,6 @@
 //! What a robot's links look like: capsules along the way from joint to joint.
 
-use ballbar::{JointKind, Vector3};
+use ballbar::{JointKind, JointVector, Vector3};
 
 use super::geometry::Segment;
 use crate::kinematics::{Posture, Skeleton};
@@ -13,10 +13,8 @@ enum Part {
     Slide,
     /// Along the axis of the joint before it.
     Along,
-    /// From that axis to the next joint.
+    /// From that axis to the next one.
     Across,
-    /// Straight from joint to joint, where either of those is too short for a part of its own.
-    Straight,
 }
 
 /// A capsule of a link.
@@ -30,8 +28,9 @@ pub(super) struct Body {
     is_flush: bool,
 }
 
-/// Shorter parts lie in the rounded ends of their neighbours: fitted robots have offsets of micrometres and millimetres everywhere.
-const SHORT_M: f64 = 0.010;
+/// Shorter parts, in radii of a link, lie in the rounded ends of their neighbours but for a fiftieth of a radius; fitted robots have offsets
+/// of micrometres and millimetres everywhere.
+const SHORT_RADII: f64 = 0.4;
 
 impl Body {
     pub(super) fn is_slide(&self) -> bool {
@@ -44,7 +43,6 @@ impl Body {
             Part::Slide => (posture.end_m(self.link - 1), start_m),
             Part::Along => (start_m, corner_m),
             Part::Across => (corner_m, end_m),
-            Part::Straight => (start_m, end_m),
         };
         if !self.is_flush {
             return Segment { from_m, to_m };
@@ -61,17 +59,12 @@ impl Body {
 /// end, since the plate with the spheres begins there.
 pub(super) fn bodies(skeleton: &Skeleton, solids: &Solids) -> Vec<Body> {
     let mut bodies: Vec<Body> = Vec::new();
+    let home = skeleton.at(&JointVector::zero());
     for link in 0..=skeleton.joints() {
-        let translation_m = skeleton.translation_m(link);
-        let is_long = |length_m: f64| length_m >= SHORT_M;
-        let is_bent = is_long(translation_m.z.abs()) && is_long(translation_m.xy().norm());
+        let (start_m, corner_m, end_m) = (home.start_m(link), home.corner_m(link), home.end_m(link));
+        let is_long = |from_m: Vector3<f64>, to_m: Vector3<f64>| (to_m - from_m).norm() > SHORT_RADII * solids.link_radius_m;
         let slides = link > 0 && skeleton.encoders()[link - 1].kind == JointKind::Prismatic;
-        let parts = [
-            (Part::Slide, slides),
-            (Part::Along, is_bent),
-            (Part::Across, is_bent),
-            (Part::Straight, !is_bent && is_long(translation_m.norm())),
-        ];
+        let parts = [(Part::Slide, slides), (Part::Along, is_long(start_m, corner_m)), (Part::Across, is_long(corner_m, end_m))];
         let there = parts.into_iter().filter(|(_, is_there)| *is_there);
         bodies.extend(there.map(|(part, _)| Body { link, part, radius_m: solids.link_radius_m, is_flush: false }));
     }

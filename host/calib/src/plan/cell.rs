@@ -1,6 +1,8 @@
 //! A robot at its rig, and everything that a pose is judged by.
 
-use ballbar::{JointKind, JointVector, Kinematics, LANES, LengthRows, MAX_PARAMETERS, Measurement, Pairing, Parameter, Quantity};
+use ballbar::{
+    Chain, JointKind, JointVector, Kinematics, LANES, LengthRows, MAX_PARAMETERS, Measurement, Pairing, Parameter, Quantity,
+};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -8,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::contact::Nearest;
 use super::fixtures::{FixturesOverlap, check_fixtures};
 use super::scene::Scene;
-use crate::kinematics::{InverseKinematics, Posture};
+use crate::kinematics::{CanonicalFrames, InverseKinematics, Posture};
 use crate::model::{PairingId, Rig, Robot};
 use crate::unknowns::plausible_error;
 
@@ -107,8 +109,9 @@ impl<'a> Cell<'a> {
     /// # Errors
     /// [`FixturesOverlap`] when the rig cannot be as it is described.
     pub fn new(robot: &'a Robot, rig: &'a Rig, travel_m: f64, margins: Margins, pace: Pace) -> Result<Self, FixturesOverlap> {
-        let (scene, gaps) = Scene::new(robot, rig, margins.clearance_m);
-        let inverse = InverseKinematics::new(robot);
+        let planned = Robot { chain: CanonicalFrames::new(&robot.chain).rounded_chain(), ..robot.clone() };
+        let (scene, gaps) = Scene::new(&planned, rig, margins.clearance_m);
+        let inverse = InverseKinematics::new(&planned);
         let skeleton = inverse.skeleton();
         check_fixtures(&scene, rig, &skeleton.at(&JointVector::zero()), &gaps, margins.clearance_m)?;
         let mut reach_m = vec![0.0; skeleton.joints()];
@@ -123,16 +126,17 @@ impl<'a> Cell<'a> {
                 behind_m += ends[0].max(ends[1]);
             }
         }
-        let parameters = (0..robot.chain.parameter_count()).map(Parameter::from_index);
-        let scale = |parameter| plausible_deviation(robot.chain.unit(parameter));
-        let deviation = |parameter| if robot.chain.is_conventionally_held(parameter) { 0.0 } else { scale(parameter) };
+        let chain = skeleton.chain();
+        let parameters = (0..chain.parameter_count()).map(Parameter::from_index);
+        let scale = |parameter| plausible_deviation(chain.unit(parameter));
+        let deviation = |parameter| if chain.is_conventionally_held(parameter) { 0.0 } else { scale(parameter) };
         Ok(Self {
             robot,
             rig,
             travel_m,
             margins,
             pace,
-            kinematics: Kinematics::new(&robot.chain),
+            kinematics: Kinematics::new(chain),
             scales: parameters.clone().map(scale).collect(),
             deviations: parameters.map(deviation).collect(),
             arm_m: behind_m.max(f64::MIN_POSITIVE),
@@ -140,6 +144,12 @@ impl<'a> Cell<'a> {
             inverse,
             scene,
         })
+    }
+
+    /// The nominal robot in canonical frames, to the nanometre, in which all of a plan is computed: the same plan whatever frames the robot's
+    /// file is written in.
+    pub fn chain(&self) -> &Chain<f64> {
+        self.inverse.skeleton().chain()
     }
 
     /// Where the links stand.
@@ -242,8 +252,8 @@ impl<'a> Cell<'a> {
     }
 
     /// A plausible true robot: every independent parameter off by a normal deviation.
-    pub fn plausible_robot(&self, rng: &mut ChaCha8Rng) -> ballbar::Chain<f64> {
-        let mut chain = self.robot.chain.clone();
+    pub fn plausible_robot(&self, rng: &mut ChaCha8Rng) -> Chain<f64> {
+        let mut chain = self.chain().clone();
         for (value, deviation) in chain.parameters_mut().iter_mut().zip(&self.deviations) {
             let normal: f64 = StandardNormal.sample(rng);
             *value += deviation * normal;

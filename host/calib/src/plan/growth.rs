@@ -99,7 +99,7 @@ impl<'a, 'c> Growth<'a, 'c> {
             },
             islands: Islands::default(),
             home: None,
-            experience: Experience::new(cell.robot.chain.parameter_count()),
+            experience: Experience::new(cell.chain().parameter_count()),
             choices: Vec::new(),
             most: wanted.crossings,
             progress,

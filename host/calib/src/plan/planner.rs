@@ -256,7 +256,7 @@ fn all_roads(cell: &Cell<'_>, options: &PlanOptions, tell: &Tell<'_>) -> Vec<She
         rng.set_stream(i as u64);
         families(cell, shells[i], &options.grid, wanted, &mut rng, &progress.part(ticks))
     });
-    most_telling(cell.robot.chain.parameter_count(), in_one_piece(cell, all, options.seed, tell))
+    most_telling(cell.chain().parameter_count(), in_one_piece(cell, all, options.seed, tell))
 }
 
 fn all_tours(cell: &Cell<'_>, roads: &mut [ShellRoads], chosen: &[Vec<usize>], tell: &Tell<'_>) -> Vec<Vec<Stop>> {
@@ -291,7 +291,7 @@ fn choose(
     if wanted > pool.len() {
         return Err(PlanError::TooFewToChoose { wanted, found: pool.len() });
     }
-    let (chain, limits) = (&cell.robot.chain, &cell.robot.limits);
+    let (chain, limits) = (cell.chain(), &cell.robot.limits);
     let measured = |nodes: &[(usize, usize)]| -> Vec<Measurement<f64>> {
         nodes.iter().map(|&(shell, node)| measurement(&roads[shell].shell, &roads[shell].nodes[node].q)).collect()
     };
@@ -372,13 +372,13 @@ fn assemble(
         progress.tick(1);
     }
     let moves_s: f64 = rows.windows(2).map(|pair| cell.seconds(&pair[0].q, &pair[1].q)).sum();
-    let expectation = Expectation::new(&cell.robot.chain, &measurements, &cell.robot.limits);
-    let quality = Quality::new(&cell.robot.chain, &measurements, &cell.robot.limits, &expectation.identified);
+    let expectation = Expectation::new(cell.chain(), &measurements, &cell.robot.limits);
+    let quality = Quality::new(cell.chain(), &measurements, &cell.robot.limits, &expectation.identified);
     Plan {
         duration_s: moves_s + cell.pace.settle_s * measurements.len() as f64,
         rows,
         shells,
-        unfit: Unfit::of(&cell.robot.chain, &cell.robot.limits, measurements.len(), &expectation, quality.as_ref()),
+        unfit: Unfit::of(cell.chain(), &cell.robot.limits, measurements.len(), &expectation, quality.as_ref()),
         expectation,
         quality,
         comparison: None,

@@ -135,7 +135,7 @@ impl Reach {
         let Some(last) = joints.checked_sub(1) else { return Self { by_joint_m } };
         let axis = &posture.axes()[last];
         // The origin behind the last joint before it: for a slide the farthest that it can be is added below.
-        let origin_m = posture.start_m(joints);
+        let origin_m = posture.corner_m(joints);
         by_joint_m[last] = farthest_m(core, |point_m| axis.direction.cross(&(point_m - axis.point_m)).norm(), &axis.direction);
         let behind = farthest_m(core, |point_m| (point_m - origin_m).norm(), &Vector3::zeros());
         // A slide's own capsule reaches back to where it comes from.
