@@ -5,6 +5,7 @@ use std::fmt;
 use ballbar::{Chain, JointKind, Link};
 use nalgebra::Rotation3;
 
+use crate::kinematics::CanonicalFrames;
 use crate::model::{Dataset, Robot};
 use crate::units::{ScreenUnit, fixed};
 
@@ -53,8 +54,11 @@ const SCALE: f64 = 0.1;
 const TEN_DEGREES: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
 /// What changed by more than designs are off, from a design to a fit. Links are judged whole, their displacement and their rotation: how
-/// a rotation is split into three angles means nothing.
+/// a rotation is split into three angles means nothing, and both robots are seen in the design's canonical frames: a frame that somebody wrote a
+/// hundred metres away moves by as much with the least turn.
 pub(super) fn large_changes(design: &Chain<f64>, fitted: &Chain<f64>) -> Vec<Change> {
+    let frames = CanonicalFrames::new(design);
+    let (design, fitted) = (frames.chain(), &frames.in_canonical_frames(fitted));
     let joints = design.joints();
     let mut changes = Vec::new();
     let mut judge = |part: String, size: f64, unit: ScreenUnit, (remarkable, impossible): (f64, f64)| {

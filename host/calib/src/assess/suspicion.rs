@@ -9,6 +9,7 @@ use super::mistake::{Mistake, any_constant, conceivable};
 use super::plausibility::large_changes;
 use super::refusals::Refusal;
 use crate::identify::{Finding, Held, solve_lengths};
+use crate::kinematics::CanonicalFrames;
 use crate::units::{fixed, mm_from_m};
 
 /// What may be wrong. Its text is a whole sentence.
@@ -122,22 +123,27 @@ fn variance(values: &[f64]) -> f64 {
 
 /// Quick fits, all of the same parameters and rows: those that are independent in these poses, weak ones too. How weak they are was judged
 /// by the residuals of measurements that do not fit, and a fit without them would leave what is wrong with the design.
-struct Trial<'a> {
-    design: &'a Chain<f64>,
+struct Trial {
+    design: Chain<f64>,
     free: FreeParameters,
     options: LmOptions,
 }
 
-impl<'a> Trial<'a> {
+impl Trial {
     /// A design is a good start: what has not come near in so many steps is not the right one.
     const STEPS: usize = 20;
 
-    fn new(evidence: &Evidence<'a>) -> Self {
-        let parameters = &evidence.fit.parameters;
-        let is_free = |index: usize| matches!(parameters[index].held, None | Some(Held::Finding(Finding::Weak { .. })));
-        let of_chain = evidence.fit.unknowns.of_chain().len();
-        let free = FreeParameters::from_indices((0..of_chain).filter(|&index| is_free(index))).unwrap_or(FreeParameters::all(0));
-        Self { design: &evidence.robot.chain, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
+    fn new(evidence: &Evidence<'_>) -> Self {
+        let Evidence { robot, fit, .. } = evidence;
+        let design = if fit.is_canonical { CanonicalFrames::new(&robot.chain).chain().clone() } else { robot.chain.clone() };
+        let is_found = |index: usize| matches!(fit.identifiability.findings[index], Finding::Identified | Finding::Weak { .. });
+        let is_free = |index: usize| match &fit.parameters[index].held {
+            _ if fit.is_canonical => is_found(index),
+            held => matches!(held, None | Some(Held::Finding(Finding::Weak { .. }))),
+        };
+        let free = (0..design.parameter_count()).filter(|&index| is_free(index));
+        let free = FreeParameters::from_indices(free).unwrap_or(FreeParameters::all(0));
+        Self { design, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
     }
 
     /// The RMS residual of a fit, metres, and whether its parameters are a robot's; `None` where nothing can be fitted.
@@ -146,11 +152,11 @@ impl<'a> Trial<'a> {
         if rows.len() <= self.free.len() {
             return None;
         }
-        let fitted = solve_lengths(self.design, &rows, &self.free, &self.options).chain;
+        let fitted = solve_lengths(&self.design, &rows, &self.free, &self.options).chain;
         let kinematics = Kinematics::new(&fitted);
         let weight: f64 = rows.iter().map(|row| row.weight).sum();
         let squares: f64 = rows.iter().map(|row| row.weight * kinematics.residual(row).powi(2)).sum();
-        let is_plausible = large_changes(self.design, &fitted).iter().all(|change| !change.is_impossible);
+        let is_plausible = large_changes(&self.design, &fitted).iter().all(|change| !change.is_impossible);
         Some(((squares / weight).sqrt(), is_plausible)).filter(|(rms_m, _)| rms_m.is_finite())
     }
 

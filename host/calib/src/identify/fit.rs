@@ -1,48 +1,18 @@
-//! A fit, whole: from a design and a dataset to parameters, how sure they are, and what poses left out say of them.
+//! What a fit found: parameters, how sure they are, and what poses left out say of them.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use ballbar::{Damping, LmOptions, Parameter, ParameterUnit};
-use thiserror::Error;
+use ballbar::ParameterUnit;
 
-use super::cross_validation::{CrossValidation, cross_validate};
-use super::hold::{Held, Hold};
+use super::cross_validation::CrossValidation;
+use super::hold::Held;
 use super::identifiability::Identifiability;
-use super::lm::{Objective, Solution, solve};
-use super::observation::Observation;
+use super::lm::Solution;
 use super::residual::{Residual, ResidualSummary};
-use super::residuals::{ALIKE, Outlier, PairingResiduals, by_pairing, neighbour_correlation, outliers};
+use super::residuals::{Outlier, PairingResiduals};
 use super::uncertainty::Uncertainty;
-use crate::model::{Dataset, PoseRow, Rig, Robot};
-use crate::unknowns::{AnyBlock, Unknowns};
-
-/// What to find out beside the chain, what to hold, and how to step.
-#[derive(Clone, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FitOptions {
-    /// Parameters that stay at their design values.
-    pub hold: Hold,
-    /// λI or λ·diag.
-    pub damping: Damping,
-    /// What is not known beside the chain ([`crate::unknowns::Kind::block`]).
-    pub unknowns: Vec<AnyBlock>,
-}
-
-/// Why there is no fit.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum FitError {
-    /// A fit without redundancy would meet every length and prove nothing.
-    #[error("{rows} poses for {free} free parameters, expected more poses than free parameters")]
-    NoRedundancy {
-        /// Poses given.
-        rows: usize,
-        /// Parameters that would be free.
-        free: usize,
-    },
-    /// A parameter is to be held that this robot does not have.
-    #[error("the robot has no parameter `{0}`")]
-    NoSuchParameter(Parameter),
-}
+use crate::model::{Dataset, Rig};
+use crate::unknowns::Unknowns;
 
 /// One unknown before and after.
 #[derive(Clone, Debug)]
@@ -68,6 +38,8 @@ pub struct FittedParameter {
 pub struct Fit {
     /// What could be found out.
     pub unknowns: Unknowns,
+    /// Whether it was found out in canonical frames, which findings and their names are of then; all values are in the robot's own.
+    pub is_canonical: bool,
     /// The fitted chain and values, why the solve ended, its iterations and the course of its RMS.
     pub solution: Solution,
     /// Wall time of the solve alone.
@@ -104,147 +76,16 @@ pub struct Fit {
 impl Fit {
     /// Number of free unknowns.
     pub fn free_parameters(&self) -> usize {
-        self.parameters.iter().filter(|parameter| parameter.held.is_none()).count()
+        self.uncertainty.spectrum.singular_values.len()
     }
 
     /// Residuals of any rows that were measured with the same rig, with the fitted values of all unknowns.
     pub fn residuals_of(&self, dataset: &Dataset) -> Vec<Residual> {
-        residuals_at(&self.unknowns, &self.solution.values, dataset)
+        Residual::of_rows(&self.unknowns, &self.solution.values, dataset.rows.iter())
     }
 
     /// The rig as it was found to be.
     pub fn rig(&self, rig: &Rig) -> Rig {
         self.unknowns.rig(&self.solution.values, rig)
     }
-}
-
-/// Fits the robot's parameters, and what else [`FitOptions::unknowns`] asks for, to the dataset: Levenberg-Marquardt on
-/// `Σ w (d_measured − d_computed)²` ([`solve`]) from the design, over what [`FitOptions::hold`] leaves free; then what the result is worth, by linear theory and by poses left out in turn.
-///
-/// The minimum is the paper's least-squares solution (A. Goswami, A. Quaid and M. Peshkin, IEEE Control Systems 13(5), 1993); which parameters
-/// are free is found anew for each dataset ([`Identifiability`]).
-///
-/// ```
-/// use ballbar_calib::designs;
-/// use ballbar_calib::identify::{FitOptions, fit};
-/// use ballbar_calib::model::Dataset;
-/// use ballbar_calib::simulate::Shells;
-///
-/// let (design, rig) = (designs::puma560(), designs::triangles());
-/// let mut truth = design.clone();
-/// truth.chain.parameters_mut()[16] += 0.002; // x3
-/// let pairings = rig.all_pairings();
-/// let shells = Shells {
-///     planned_with: &design, truth: &truth, rig: &rig, pairings: &pairings, bar_m: 0.46, per_pairing: 20, sigma_m: 0.0, seed: 1,
-/// };
-/// let poses = Dataset::new("simulated", shells.simulate(|| ())?.into_iter().map(|pose| pose.row).collect())?;
-///
-/// let fit = fit(&design, &poses, &FitOptions::default())?;
-/// assert!(fit.solution.status.is_minimum() && fit.fitted.rms_m < 1e-9);
-/// assert!((fit.solution.chain.parameters()[16] - truth.chain.parameters()[16]).abs() < 1e-8);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// [`FitError`] when there are no more poses than free parameters, or when a parameter is to be held that the robot lacks.
-pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
-    let unknowns = Unknowns::new(&robot.chain, options.unknowns.clone());
-    let chain = unknowns.of_chain();
-    let named: Vec<usize> = options.hold.names.iter().map(|name| name.index()).collect();
-    if let Some(&name) = options.hold.names.iter().find(|name| name.index() >= chain.len()) {
-        return Err(FitError::NoSuchParameter(name));
-    }
-    let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
-    let start = unknowns.start();
-    let found = |sigma_m: f64| {
-        Identifiability::of(chain, unknowns.list(), &Observation::of(&unknowns, &start, &rows, sigma_m), &robot.limits, &named)
-    };
-    let sigma_m = sigma_m(dataset, &unknowns, |sigma_m| found(sigma_m).noise_m);
-    let identifiability = found(sigma_m);
-    let reasons = options.hold.reasons(chain, &identifiability);
-    let free: Vec<usize> = (0..reasons.len()).filter(|&index| reasons[index].is_none()).collect();
-    let beliefs = free.iter().filter(|&&index| unknowns.list()[index].tolerance.is_some()).count();
-    if rows.len() + beliefs <= free.len() {
-        return Err(FitError::NoRedundancy { rows: rows.len(), free: free.len() - beliefs });
-    }
-
-    let lm = LmOptions { damping: options.damping, ..LmOptions::default() };
-    let objective = Objective { unknowns: &unknowns, rows: &rows, free: &free, sigma_m };
-    let began = Instant::now();
-    let solution = solve(&objective, &lm);
-    let solve_time = began.elapsed();
-
-    let uncertainty = Uncertainty::new(&Observation::of(&unknowns, &solution.values, &rows, sigma_m), &free);
-    let before = residuals_at(&unknowns, &start, dataset);
-    let after = residuals_at(&unknowns, &solution.values, dataset);
-    let base_alone = base_alone(&objective, dataset, &reasons, &lm);
-    let neighbour_correlation = neighbour_correlation(dataset, &after);
-    let in_blocks = neighbour_correlation.is_some_and(|correlation| correlation > ALIKE);
-    let (cross_validation, left_out) = cross_validate(&objective, &lm, in_blocks).unzip();
-    Ok(Fit {
-        solve_time,
-        identifiability,
-        parameters: fitted_parameters(&unknowns, &solution.values, &free, &uncertainty, reasons),
-        initial: ResidualSummary::new(&before),
-        fitted: ResidualSummary::new(&after),
-        initial_by_pairing: by_pairing(dataset, &before),
-        fitted_by_pairing: by_pairing(dataset, &after),
-        outliers: outliers(dataset, &after),
-        neighbour_correlation,
-        cross_validation,
-        left_out: left_out.unwrap_or_default(),
-        base_alone,
-        residuals: after,
-        uncertainty,
-        solution,
-        unknowns,
-    })
-}
-
-/// What a length of weight one deviates by, metres: as it is stated, or else as the lengths show it. Without meaning, and not looked for,
-/// where nothing is weighed against it.
-fn sigma_m(dataset: &Dataset, unknowns: &Unknowns, shown_m: impl Fn(f64) -> f64) -> f64 {
-    /// What good ball-bars deviate by.
-    const USUAL_M: f64 = 5e-5;
-    /// Each beside the one before; more change nothing that could be seen.
-    const ROUNDS: usize = 2;
-    match dataset.stated_sigma_m() {
-        Some(stated_m) => stated_m,
-        None if unknowns.have_priors() => (0..ROUNDS).fold(USUAL_M, |sigma_m, _| shown_m(sigma_m).max(f64::MIN_POSITIVE)),
-        None => USUAL_M,
-    }
-}
-
-fn residuals_at(unknowns: &Unknowns, values: &[f64], dataset: &Dataset) -> Vec<Residual> {
-    Residual::of_rows(unknowns, values, dataset.rows.iter())
-}
-
-/// What of the design's error is only that nobody knew where the robot stands: no fault of the robot, and corrected by a frame.
-fn base_alone(objective: &Objective<'_>, dataset: &Dataset, reasons: &[Option<Held>], lm: &LmOptions) -> Option<ResidualSummary> {
-    let base: Vec<usize> = objective.unknowns.of_chain().of_base().collect();
-    let is_wanted = base.iter().all(|&index| !matches!(reasons[index], Some(Held::ByName)));
-    is_wanted.then(|| {
-        let values = solve(&Objective { free: &base, ..*objective }, lm).values;
-        ResidualSummary::new(&residuals_at(objective.unknowns, &values, dataset))
-    })
-}
-
-fn fitted_parameters(
-    unknowns: &Unknowns,
-    values: &[f64],
-    free: &[usize],
-    uncertainty: &Uncertainty,
-    reasons: Vec<Option<Held>>,
-) -> Vec<FittedParameter> {
-    let std_of = |index: usize| free.binary_search(&index).ok().and_then(|position| uncertainty.std[position]);
-    let list = unknowns.list().iter().zip(values).zip(reasons).enumerate();
-    list.map(|(index, ((unknown, &fitted), held))| FittedParameter {
-        name: unknown.name.clone(),
-        unit: unknown.unit,
-        initial: unknown.start,
-        fitted,
-        std: std_of(index),
-        held,
-    })
-    .collect()
 }

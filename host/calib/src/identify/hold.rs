@@ -41,6 +41,11 @@ impl Hold {
         Self { rule: HoldRule::None, names: Vec::new() }
     }
 
+    /// Whether it says nothing that depends on how the robot's frames are written.
+    pub fn is_of_any_frames(&self) -> bool {
+        self.rule == HoldRule::Auto && self.names.is_empty()
+    }
+
     /// Why each unknown is held; `None` for the free ones.
     pub fn reasons(&self, chain: &ChainBlock, found: &Identifiability) -> Vec<Option<Held>> {
         let reason = |(index, finding): (usize, &Finding)| match self.rule {

@@ -9,13 +9,13 @@ use super::spectrum::Spectrum;
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Uncertainty {
-    /// One a free unknown, in their order, SI: `None` where the data leave the parameter undetermined.
+    /// One an unknown that moves, in their order, SI: `None` where the data leave the parameter undetermined.
     pub std: Vec<Option<f64>>,
     /// Estimated standard deviation s of a length of weight 1, metres; `None` without redundancy.
     pub sigma_m: Option<f64>,
     /// Singular values of the f free columns, scaled.
     pub spectrum: Spectrum,
-    /// Covariance of the free unknowns, f × f in their order, SI units; only its entries between determined parameters mean anything.
+    /// Covariance of the unknowns that move, m × m in their order, SI units; only its entries between determined parameters mean anything.
     pub covariance: DMatrix<f64>,
 }
 

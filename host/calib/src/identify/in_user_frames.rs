@@ -1,0 +1,63 @@
+//! A fit in canonical frames, seen in the frames that the robot is written in.
+
+use nalgebra::DMatrix;
+
+use super::fit::{Fit, FittedParameter};
+use super::hold::Held;
+use super::identifiability::Finding;
+use super::uncertainty::Uncertainty;
+use crate::kinematics::CanonicalFrames;
+use crate::unknowns::Unknowns;
+
+/// A parameter that a metre or radian of no canonical one moves by as much stays where it is: above the rounding of frames a hundred metres
+/// away.
+const STAYS: f64 = 1e-7;
+
+/// The same fit with values, deviations and reasons of the robot's own parameters. Redundant ones are at their design values; what was held for
+/// other reasons may move along with what was free, as another frame's coordinates do. `unknowns` are those of the robot as it is written.
+pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unknowns) -> Fit {
+    let fitted = frames.in_user_frames(&fit.solution.chain);
+    let of_chain = unknowns.of_chain().len();
+    let mut solution = fit.solution;
+    let user_by_free = user_by_free(&frames.user_by_canonical(&solution.chain), &fit.parameters);
+    solution.values[..of_chain].copy_from_slice(fitted.parameters());
+    solution.chain = fitted;
+
+    let moves: Vec<bool> = user_by_free.row_iter().map(|row| row.amax() > STAYS).collect();
+    let moved: Vec<usize> = (0..moves.len()).filter(|&index| moves[index]).collect();
+    let uncertainty = moved_uncertainty(fit.uncertainty, &user_by_free.select_rows(&moved));
+    let stds = moved.iter().zip(&uncertainty.std);
+    let std_of = |index: usize| stds.clone().find(|(other, _)| **other == index).and_then(|(_, std)| *std);
+    let values = unknowns.list().iter().zip(&solution.values).zip(fit.parameters).enumerate();
+    let parameters = values.map(|(index, ((unknown, &value), canonical))| FittedParameter {
+        name: unknown.name.clone(),
+        unit: unknown.unit,
+        initial: unknown.start,
+        fitted: value,
+        std: std_of(index),
+        held: if moves[index] { None } else { Some(canonical.held.unwrap_or(Held::Finding(MOVES_WITH_OTHERS))) },
+    });
+    Fit { parameters: parameters.collect(), solution, uncertainty, unknowns, is_canonical: true, ..fit }
+}
+
+/// Of a parameter that is no coordinate of its own in these frames, such as alpha besides gamma where beta is a right angle.
+const MOVES_WITH_OTHERS: Finding = Finding::Redundant { with: Vec::new() };
+
+/// `∂user/∂canonical` of all unknowns by the free ones: those behind the chain's are the same in all frames.
+fn user_by_free(of_chain: &DMatrix<f64>, canonical: &[FittedParameter]) -> DMatrix<f64> {
+    let (chain, all) = (of_chain.nrows(), canonical.len());
+    let free: Vec<usize> = (0..all).filter(|&index| canonical[index].held.is_none()).collect();
+    DMatrix::from_fn(all, free.len(), |row, column| match free[column] {
+        index if index < chain && row < chain => of_chain[(row, index)],
+        index => f64::from(row == index),
+    })
+}
+
+/// Deviations and covariance of what moves, by those of what was free.
+fn moved_uncertainty(canonical: Uncertainty, moved_by_free: &DMatrix<f64>) -> Uncertainty {
+    let covariance = moved_by_free * &canonical.covariance * moved_by_free.transpose();
+    let depends = |row: usize, column: usize| moved_by_free[(row, column)].abs() > STAYS;
+    let is_told = |row: usize| (0..moved_by_free.ncols()).all(|column| canonical.std[column].is_some() || !depends(row, column));
+    let std = (0..covariance.nrows()).map(|row| is_told(row).then(|| covariance[(row, row)].max(0.0).sqrt())).collect();
+    Uncertainty { std, covariance, ..canonical }
+}
