@@ -2,13 +2,13 @@
 
 use std::fmt;
 
-use ballbar::{Chain, FreeParameters, Kinematics, LmOptions, Measurement};
+use ballbar::{Chain, FreeParameters, Kinematics, LmOptions, Measurement, Parameter};
 
 use super::evidence::Evidence;
 use super::mistake::{Mistake, any_constant, conceivable};
 use super::plausibility::large_changes;
 use super::refusals::Refusal;
-use crate::identify::{Finding, Held, solve_lengths};
+use crate::identify::{Finding, solve_lengths};
 use crate::kinematics::CanonicalFrames;
 use crate::units::{fixed, mm_from_m};
 
@@ -121,7 +121,7 @@ fn variance(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count
 }
 
-/// Quick fits, all of the same parameters and rows: those that are independent in these poses, weak ones too. How weak they are was judged
+/// Quick fits, all of the same parameters (in canonical frames) and rows: those that these poses tell, weak ones too. How weak they are was judged
 /// by the residuals of measurements that do not fit, and a fit without them would leave what is wrong with the design.
 struct Trial {
     design: Chain<f64>,
@@ -135,13 +135,13 @@ impl Trial {
 
     fn new(evidence: &Evidence<'_>) -> Self {
         let Evidence { robot, fit, .. } = evidence;
-        let design = if fit.is_canonical { CanonicalFrames::new(&robot.chain).chain().clone() } else { robot.chain.clone() };
-        let is_found = |index: usize| matches!(fit.identifiability.findings[index], Finding::Identified | Finding::Weak { .. });
-        let is_free = |index: usize| match &fit.parameters[index].held {
-            _ if fit.is_canonical => is_found(index),
-            held => matches!(held, None | Some(Held::Finding(Finding::Weak { .. }))),
+        let design = CanonicalFrames::new(&robot.chain).chain().clone();
+        let is_untold = |index: usize| {
+            let finding = &fit.identifiability.findings[index];
+            matches!(finding, Finding::NotExcited { .. } | Finding::NoEffect | Finding::LeftOut)
         };
-        let free = (0..design.parameter_count()).filter(|&index| is_free(index));
+        let is_redundant = |index: usize| design.is_conventionally_held(Parameter::from_index(index));
+        let free = (0..design.parameter_count()).filter(|&index| !is_redundant(index) && !is_untold(index));
         let free = FreeParameters::from_indices(free).unwrap_or(FreeParameters::all(0));
         Self { design, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
     }

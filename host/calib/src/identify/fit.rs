@@ -38,8 +38,6 @@ pub struct FittedParameter {
 pub struct Fit {
     /// What could be found out.
     pub unknowns: Unknowns,
-    /// Whether it was found out in canonical frames, which findings and their names are of then; all values are in the robot's own.
-    pub is_canonical: bool,
     /// The fitted chain and values, why the solve ended, its iterations and the course of its RMS.
     pub solution: Solution,
     /// Wall time of the solve alone.

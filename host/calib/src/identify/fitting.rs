@@ -86,7 +86,11 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
     }
     let frames = CanonicalFrames::new(&robot.chain);
     let canonical = fit_as_written(frames.chain(), &robot.limits, dataset, options)?;
-    Ok(in_user_frames(canonical, &frames, Unknowns::new(&robot.chain, options.unknowns.clone())))
+    let unknowns = Unknowns::new(&robot.chain, options.unknowns.clone());
+    let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
+    let observation = Observation::of(&unknowns, &unknowns.start(), &rows, sigma_of(dataset));
+    let found = Identifiability::of(unknowns.of_chain(), unknowns.list(), &observation, &robot.limits, &[]);
+    Ok(in_user_frames(canonical, &frames, unknowns, &found))
 }
 
 /// The same in the frames in which the chain is written.
@@ -141,22 +145,24 @@ fn fit_as_written(design: &Chain<f64>, limits: &[JointLimits], dataset: &Dataset
         uncertainty,
         solution,
         unknowns,
-        is_canonical: false,
     })
 }
 
 /// What a length of weight one deviates by, metres: as it is stated, or else as the lengths show it. Without meaning, and not looked for,
 /// where nothing is weighed against it.
 fn sigma_m(dataset: &Dataset, unknowns: &Unknowns, shown_m: impl Fn(f64) -> f64) -> f64 {
-    /// What good ball-bars deviate by.
-    const USUAL_M: f64 = 5e-5;
     /// Each beside the one before; more change nothing that could be seen.
     const ROUNDS: usize = 2;
-    match dataset.stated_sigma_m() {
-        Some(stated_m) => stated_m,
-        None if unknowns.have_priors() => (0..ROUNDS).fold(USUAL_M, |sigma_m, _| shown_m(sigma_m).max(f64::MIN_POSITIVE)),
-        None => USUAL_M,
+    if dataset.stated_sigma_m().is_some() || !unknowns.have_priors() {
+        return sigma_of(dataset);
     }
+    (0..ROUNDS).fold(sigma_of(dataset), |sigma_m, _| shown_m(sigma_m).max(f64::MIN_POSITIVE))
+}
+
+/// As it is stated, or as good ball-bars have it.
+fn sigma_of(dataset: &Dataset) -> f64 {
+    const USUAL_M: f64 = 5e-5;
+    dataset.stated_sigma_m().unwrap_or(USUAL_M)
 }
 
 fn residuals_at(unknowns: &Unknowns, values: &[f64], dataset: &Dataset) -> Vec<Residual> {

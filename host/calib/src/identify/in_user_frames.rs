@@ -1,10 +1,11 @@
 //! A fit in canonical frames, seen in the frames that the robot is written in.
 
+use ballbar::{Parameter, ParameterKind};
 use nalgebra::DMatrix;
 
 use super::fit::{Fit, FittedParameter};
 use super::hold::Held;
-use super::identifiability::Finding;
+use super::identifiability::{Finding, Identifiability};
 use super::uncertainty::Uncertainty;
 use crate::kinematics::CanonicalFrames;
 use crate::unknowns::Unknowns;
@@ -14,8 +15,9 @@ use crate::unknowns::Unknowns;
 const STAYS: f64 = 1e-7;
 
 /// The same fit with values, deviations and reasons of the robot's own parameters. Redundant ones are at their design values; what was held for
-/// other reasons may move along with what was free, as another frame's coordinates do. `unknowns` are those of the robot as it is written.
-pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unknowns) -> Fit {
+/// other reasons may move along with what was free, as another frame's coordinates do. `unknowns` are those of the robot as it is written, and
+/// `found` is what the poses tell of them.
+pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unknowns, found: &Identifiability) -> Fit {
     let fitted = frames.in_user_frames(&fit.solution.chain);
     let of_chain = unknowns.of_chain().len();
     let mut solution = fit.solution;
@@ -35,13 +37,31 @@ pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unkno
         initial: unknown.start,
         fitted: value,
         std: std_of(index),
-        held: if moves[index] { None } else { Some(canonical.held.unwrap_or(Held::Finding(MOVES_WITH_OTHERS))) },
+        held: if moves[index] { None } else { Some(reason(index, canonical, &found.findings[index])) },
     });
-    Fit { parameters: parameters.collect(), solution, uncertainty, unknowns, is_canonical: true, ..fit }
+    let parameters: Vec<FittedParameter> = parameters.collect();
+    let mut identifiability = fit.identifiability;
+    for (finding, parameter) in identifiability.findings.iter_mut().zip(&parameters) {
+        *finding = match &parameter.held {
+            Some(Held::Finding(reason)) => reason.clone(),
+            _ => Finding::Identified,
+        };
+    }
+    Fit { parameters, solution, uncertainty, unknowns, identifiability, ..fit }
 }
 
-/// Of a parameter that is no coordinate of its own in these frames, such as alpha besides gamma where beta is a right angle.
-const MOVES_WITH_OTHERS: Finding = Finding::Redundant { with: Vec::new() };
+/// Why a parameter stays that nothing moves: in these frames' own names, or, where they do not tell, as in canonical ones, or because it turns
+/// its link as alpha does, where beta is a right angle.
+fn reason(index: usize, canonical: FittedParameter, found: &Finding) -> Held {
+    match (found, canonical.held) {
+        (Finding::Identified, Some(held)) => held,
+        (Finding::Identified, None) => {
+            let alpha = Parameter::new(Parameter::from_index(index).number(), ParameterKind::Alpha);
+            Held::Finding(Finding::Redundant { with: alpha.iter().map(Parameter::to_string).collect() })
+        }
+        (found, _) => Held::Finding(found.clone()),
+    }
+}
 
 /// `∂user/∂canonical` of all unknowns by the free ones: those behind the chain's are the same in all frames.
 fn user_by_free(of_chain: &DMatrix<f64>, canonical: &[FittedParameter]) -> DMatrix<f64> {
