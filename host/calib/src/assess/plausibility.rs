@@ -5,6 +5,7 @@ use std::fmt;
 use ballbar::{Chain, JointKind, Link};
 use nalgebra::Rotation3;
 
+use crate::kinematics::CanonicalFrames;
 use crate::model::{Dataset, Robot};
 use crate::units::{ScreenUnit, fixed};
 
@@ -52,8 +53,20 @@ const SCALE: f64 = 0.1;
 const TEN_DEGREES: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
 /// What changed by more than designs are off, from a design to a fit. Links are judged whole, their displacement and their rotation: how
-/// a rotation is split into three angles means nothing.
+/// a rotation is split into three angles means nothing. What is large only because a frame was put far along its axis is none: then the
+/// same robots in canonical frames, where nothing is as large, are judged.
 pub(super) fn large_changes(design: &Chain<f64>, fitted: &Chain<f64>) -> Vec<Change> {
+    let changes = large_changes_as_written(design, fitted);
+    if changes.is_empty() {
+        return changes;
+    }
+    let frames = CanonicalFrames::new(design);
+    let canonical = large_changes_as_written(frames.chain(), &frames.in_canonical_frames(fitted));
+    let severity = |changes: &[Change]| (changes.iter().filter(|change| change.is_impossible).count(), changes.len());
+    if severity(&canonical) < severity(&changes) { canonical } else { changes }
+}
+
+fn large_changes_as_written(design: &Chain<f64>, fitted: &Chain<f64>) -> Vec<Change> {
     let joints = design.joints();
     let mut changes = Vec::new();
     let mut judge = |part: String, size: f64, unit: ScreenUnit, (remarkable, impossible): (f64, f64)| {

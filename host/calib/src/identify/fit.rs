@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use ballbar::{Chain, Damping, FreeParameters, Kinematics, Measurement, Parameter, ParameterUnit};
 use thiserror::Error;
 
+use super::frames::in_user_frames;
 use super::hold::{Held, Hold};
 use super::identifiability::Identifiability;
 use super::lm::{LmOptions, Solution, solve};
@@ -12,6 +13,7 @@ use super::postures::postures;
 use super::residual::{Residual, ResidualSummary};
 use super::residuals::{ALIKE, Outlier, PairingResiduals, by_pairing, neighbour_correlation, outliers, residuals};
 use super::uncertainty::Uncertainty;
+use crate::kinematics::CanonicalFrames;
 use crate::model::{Dataset, Robot};
 
 /// What to hold, and how to step.
@@ -142,9 +144,23 @@ impl Fit {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
+/// Where no parameter is held by the paper's rule or by name, the fit does not depend on the frames that the robot is written in
+/// ([`CanonicalFrames`]); its result is in these frames all the same, its redundant parameters at their design values.
+///
 /// # Errors
 /// [`FitError`] when there are no more poses than free parameters, or when a parameter is to be held that the robot lacks.
 pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
+    if options.hold != Hold::default() {
+        return fit_in_own_frames(robot, dataset, options);
+    }
+    let frames = CanonicalFrames::new(&robot.chain);
+    let canonical = Robot { chain: frames.chain().clone(), ..robot.clone() };
+    let fit = fit_in_own_frames(&canonical, dataset, options)?;
+    let found = Identifiability::new(&robot.chain, &dataset.measurements(), &robot.limits, &[]);
+    Ok(in_user_frames(fit, robot, &frames, &found))
+}
+
+fn fit_in_own_frames(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
     let design = &robot.chain;
     let measurements = dataset.measurements();
     let names = options.hold.names.as_slice();

@@ -12,6 +12,7 @@
 mod advice;
 mod fit;
 mod fit_remarks;
+mod frames;
 mod hold;
 mod identifiability;
 mod lm;
