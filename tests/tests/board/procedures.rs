@@ -73,6 +73,7 @@ fn frames_half_a_kilometre_away_cost_a_board_no_precision() {
         let difference = put(robot).difference;
         assert!(difference.position_m < 1e-6 && difference.axis_rad < 1.5e-6, "{difference:?}");
     }
+    drop(link);
     // Whoever has the same robot in other frames may collect with this board.
     let again = || BoardLink::connect(board.port(), BAUD).unwrap();
     Homing::begin(&mut again()).unwrap().at(&[0.0; 6], None).unwrap();

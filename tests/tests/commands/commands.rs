@@ -109,7 +109,9 @@ fn fit_shows_what_it_found_for_each_rule_of_holding() {
     shows(&folder, "fit_hold_auto_and_names", &[&FIT[..], &["--hold", "auto,scale3,x7"]].concat());
 
     let paper = runs(&folder, &[&FIT, &["--hold", "paper"]]);
-    assert_eq!(paper.stdout.replace("as in the paper", "redundant"), without_reasons(&auto.stdout));
+    // The same parameters by other steps: those of the paper's set are taken in the frames of the file.
+    let table = |text: &str| text.split_once("parameter  unit").expect("a table of parameters").1.to_owned();
+    assert_eq!(table(&paper.stdout.replace("as in the paper", "redundant")), table(&without_reasons(&auto.stdout)));
     let names = "offset1,z2,alpha2,offset2,z3,alpha3,offset3,z4,alpha4,offset4,z5,alpha5,offset5,z6,alpha6,offset6,z7,alpha7";
     let named = runs(&folder, &[&FIT, &["--hold", names]]);
     assert_eq!(named.stdout.replace("by name", "as in the paper"), paper.stdout);

@@ -4,6 +4,7 @@ mod assessments;
 mod built_in_robots;
 mod canonical_frames;
 mod designs;
+mod fits_in_other_frames;
 mod golden;
 mod gradients;
 mod identification;

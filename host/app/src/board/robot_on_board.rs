@@ -1,7 +1,9 @@
 //! A robot's file as the board's parameters, and the board's parameters as something to compute with in f64.
 
-use ballbar::wire::{Answer, Command, ParameterSet, Refusal, Status, WhichSet};
-use ballbar::{Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose};
+use ballbar::wire::{Answer, Command, ParameterSet, ParameterSetError, Refusal, Status, WhichSet};
+use ballbar::{
+    Chain, Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose,
+};
 use ballbar_calib::kinematics::CanonicalFrames;
 use ballbar_calib::model::Robot;
 use miette::Diagnostic;
@@ -38,13 +40,34 @@ pub enum SetError {
 /// [`SetError`] when the file lacks encoders, or the board could not use it.
 pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, SetError> {
     joint_encoders(robot)?;
+    let unfit = |reason: String| SetError::Unfit { robot: robot.source.as_str().to_owned(), reason };
+    if robot.encoders.iter().map(|facts| facts.couplings.len()).sum::<usize>() > ballbar::MAX_COUPLINGS {
+        return Err(unfit(format!("more than {} couplings", ballbar::MAX_COUPLINGS)));
+    }
+    // First as the file has it, so that what is wrong is named as it stands there; only how far its frames lie is none of the board's business.
+    match check(&set_of(robot, &robot.chain, lvdt), robot) {
+        Ok(()) | Err(ParameterSetError::Precision { .. }) => {}
+        Err(error) => return Err(unfit(error.to_string())),
+    }
+    let set = set_of(robot, CanonicalFrames::new(&robot.chain).chain(), lvdt);
+    check(&set, robot).map_err(|error| unfit(error.to_string()))?;
+    Ok(set)
+}
+
+/// First as the board does, which does not know the limits, and then over what the limits let the robot do.
+fn check(set: &ParameterSet, robot: &Robot) -> Result<(), ParameterSetError> {
+    let ranges: Vec<_> = robot.limits.iter().map(|limits| limits.min as f32..=limits.max as f32).collect();
+    set.compile().and_then(|_| set.compile_within(&ranges)).map(|_| ())
+}
+
+fn set_of(robot: &Robot, chain: &Chain<f64>, lvdt: LvdtCurve) -> ParameterSet {
     let encoders = robot.encoders.iter().filter_map(|facts| facts.encoder);
     let couplings = robot.encoders.iter().flat_map(|facts| &facts.couplings);
-    let set = ParameterSet {
+    ParameterSet {
         name: cut_to(&robot.name, 32),
         is_calibrated: robot.standing().is_calibrated(),
-        kinds: robot.chain.joint_kinds().iter().copied().collect(),
-        parameters: CanonicalFrames::new(&robot.chain).chain().parameters().iter().map(|&value| value as f32).collect(),
+        kinds: chain.joint_kinds().iter().copied().collect(),
+        parameters: chain.parameters().iter().map(|&value| value as f32).collect(),
         encoders: encoders
             .map(|e| Encoder { counts_per_unit: e.counts_per_unit as f32, counts_per_index: e.counts_per_index })
             .collect(),
@@ -53,15 +76,7 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
             .take(ballbar::MAX_COUPLINGS)
             .collect(),
         lvdt,
-    };
-    let unfit = |reason: String| SetError::Unfit { robot: robot.source.as_str().to_owned(), reason };
-    if robot.encoders.iter().map(|facts| facts.couplings.len()).sum::<usize>() > ballbar::MAX_COUPLINGS {
-        return Err(unfit(format!("more than {} couplings", ballbar::MAX_COUPLINGS)));
     }
-    // First as the board does, which does not know the limits, and then over what the limits let the robot do.
-    let ranges: Vec<_> = robot.limits.iter().map(|limits| limits.min as f32..=limits.max as f32).collect();
-    set.compile().and_then(|_| set.compile_within(&ranges)).map_err(|error| unfit(error.to_string()))?;
-    Ok(set)
 }
 
 /// Travel of the paper's LVDT from end to end, metres.

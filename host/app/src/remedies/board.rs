@@ -61,7 +61,7 @@ impl Remedy for UploadError {
             }
             Self::TooManyJoints { .. } | Self::TooLong => "Nothing was changed on the board.",
             Self::Coarse { .. } => {
-                "Nothing was changed on the board. Large lengths that cancel cost digits: describe the robot by frames near the arm."
+                "Nothing was changed on the board. Links that are far longer than the arm reaches cost digits: are their lengths right?"
             }
             Self::ReadBack(WhichSet::Staged) => "Nothing was stored; the board keeps the parameters that it had.",
             Self::ReadBack(WhichSet::Active) => {
