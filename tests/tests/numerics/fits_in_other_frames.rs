@@ -75,7 +75,7 @@ fn a_robot_in_far_and_turned_frames_is_fitted_as_it_is_in_its_own() {
         // What is redundant stays as it was written.
         for (index, parameter) in far.parameters.iter().enumerate() {
             if parameter.held.is_some() {
-                assert!((parameter.fitted - other.chain.parameters()[index]).abs() < 1e-9, "{name}: {}", parameter.parameter);
+                assert!((parameter.fitted - other.chain.parameters()[index]).abs() < 1e-9, "{name}: {}", parameter.name);
             }
         }
     }
@@ -102,12 +102,10 @@ fn deviations_say_the_same_of_the_tool_in_all_frames() {
         let found = fit(robot, &poses, &FitOptions::default()).unwrap();
         let kinematics = Kinematics::new(&found.solution.chain);
         let q = robot.chain.joint_vector(&[0.3, -0.8, 0.5, 0.4, -0.6, 1.0]).unwrap();
-        let at_m = kinematics.base_from_tool(&q).translation_m;
-        let force = nalgebra::Vector3::x();
-        let mut row = [0.0; ballbar::MAX_PARAMETERS];
-        kinematics.wrench_columns(&q, force, at_m.cross(&force), &mut row);
-        let free = found.parameters.iter().enumerate().filter(|(_, parameter)| parameter.held.is_none());
-        let row = nalgebra::DVector::from_iterator(found.free_parameters(), free.map(|(index, _)| row[index]));
+        let mut rows = [[0.0; ballbar::MAX_PARAMETERS]; 3];
+        kinematics.position_gradient(&q, &nalgebra::Vector3::zeros(), &mut rows);
+        let moved = found.parameters.iter().enumerate().filter(|(_, parameter)| parameter.held.is_none());
+        let row = nalgebra::DVector::from_iterator(found.uncertainty.covariance.nrows(), moved.map(|(index, _)| rows[0][index]));
         (row.transpose() * &found.uncertainty.covariance * &row)[(0, 0)].sqrt()
     });
     assert!(deviations_m[0] > 1e-5 && (deviations_m[1] / deviations_m[0] - 1.0).abs() < 1e-5, "{deviations_m:?}");

@@ -327,7 +327,7 @@ fn a_robot_that_is_as_designed_has_nothing_to_correct() {
     assert_eq!(facts.assessment.answer, Answer::Unchanged, "{:?}", facts.assessment.reasons);
     let figures = figures(&facts).expect("drawn");
     let missing: Vec<&str> = figures.iter().filter(|figure| figure.drawing.is_none()).map(|figure| figure.name).collect();
-    assert_eq!(missing, ["histogram"], "residuals of exactly zero have no distribution");
+    assert_eq!(missing, ["histogram"], "residuals of rounding have no distribution");
 }
 
 #[test]

@@ -12,13 +12,16 @@ const FRAME: Frame = Frame { name: "histogram", title: "How the residuals are di
 /// Below this probability of so uneven a sample from a normal distribution, it is called not normal.
 const DOUBTFUL: f64 = 0.01;
 
+/// Below a nanometre, residuals are the rounding of what they were computed with.
+const ROUNDED_MM: f64 = 1e-6;
+
 pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let residuals_mm: Vec<f64> = facts.rows.iter().map(|row| mm_from_m(row.whitened_m)).collect();
     let count = residuals_mm.len() as f64;
     let mean = residuals_mm.iter().sum::<f64>() / count;
     let deviation = (residuals_mm.iter().map(|mm| (mm - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
 
-    if !deviation.is_normal() {
+    if deviation.is_nan() || deviation < ROUNDED_MM {
         return Ok(FRAME.missing("Not drawn: the residuals do not scatter."));
     }
 
