@@ -6,7 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Chain, Joint, JointKind, JointVector, Link, MAX_JOINTS, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Real, Row, Vector3,
+    Approach, Chain, Configuration, Joint, JointKind, JointTerms, JointVector, Link, MAX_JOINTS, Matrix3, PARAMETERS_PER_JOINT,
+    ParameterKind, Real, Row, Vector3,
 };
 
 /// Where the bar's two ends are: a chuck on the table and a sphere on the tool.
@@ -59,20 +60,22 @@ pub struct Kinematics<S> {
     joints: usize,
     links: [LinkGeometry<S>; MAX_JOINTS + 1],
     encoders: [Joint<S>; MAX_JOINTS],
+    /// None where they add nothing, so that who has none does not pay for them.
+    terms: Option<JointTerms<S>>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct LinkGeometry<S> {
-    translation_m: Vector3<S>,
+pub(crate) struct LinkGeometry<S> {
+    pub(crate) translation_m: Vector3<S>,
     /// `Rz(alpha) · Ry(beta) · Rx(gamma)`.
-    rotation: Matrix3<S>,
+    pub(crate) rotation: Matrix3<S>,
     sin_alpha: S,
     cos_alpha: S,
 }
 
 /// What a joint does at one pose.
 #[derive(Clone, Copy)]
-enum Motion<S> {
+pub(crate) enum Motion<S> {
     Turn { sin: S, cos: S },
     Slide { distance_m: S },
 }
@@ -92,12 +95,39 @@ impl<S: Real> Kinematics<S> {
                 *encoder = joint;
             }
         }
-        Self { joints: chain.joints(), links, encoders }
+        Self { joints: chain.joints(), links, encoders, terms: None }
+    }
+
+    /// The same with what the joints' terms add to their angles. Where no approach is given, none is known.
+    pub fn with_terms(chain: &Chain<S>, terms: &JointTerms<S>) -> Self {
+        Self { terms: (!terms.are_zero()).then_some(*terms), ..Self::new(chain) }
+    }
+
+    /// The chain at encoder outputs `q`, approached so: for whoever knows the approach, or asks for more than one thing.
+    pub fn configuration<'a>(&'a self, q: &'a JointVector<S>, approach: Approach) -> Configuration<'a, S> {
+        Configuration::new(self, q, approach)
     }
 
     /// Pose of the tool at encoder outputs `q`.
     pub fn base_from_tool(&self, q: &JointVector<S>) -> Pose<S> {
-        let motions = self.motions(q);
+        self.base_from_tool_approached(q, Approach::UNKNOWN)
+    }
+
+    /// Pose of the tool at encoder outputs `q` that were approached so.
+    pub fn base_from_tool_approached(&self, q: &JointVector<S>, approach: Approach) -> Pose<S> {
+        match self.terms {
+            None => self.tool_pose(&self.rigid_motions(q)),
+            Some(_) => self.displaced_tool_pose(q, approach),
+        }
+    }
+
+    /// Not inlined, so that the way without terms stays as short as it can be.
+    #[inline(never)]
+    fn displaced_tool_pose(&self, q: &JointVector<S>, approach: Approach) -> Pose<S> {
+        self.tool_pose(&self.motions_approached(q, approach))
+    }
+
+    pub(crate) fn tool_pose(&self, motions: &[Motion<S>; MAX_JOINTS]) -> Pose<S> {
         let last = &self.links[self.joints];
         // Two columns of the rotation and the origin travel to the base; the third column is their cross product.
         let mut x_axis: Vector3<S> = last.rotation.column(0).into();
@@ -164,15 +194,62 @@ impl<S: Real> Kinematics<S> {
         self.sweep_wrench(q, &self.motions(q), force_base, moment_base, row);
     }
 
+    pub(crate) fn joints(&self) -> usize {
+        self.joints
+    }
+
+    pub(crate) fn joint_kind(&self, i: usize) -> JointKind {
+        self.encoders[i].kind
+    }
+
+    pub(crate) fn links(&self) -> &[LinkGeometry<S>; MAX_JOINTS + 1] {
+        &self.links
+    }
+
     fn motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
+        self.motions_approached(q, Approach::UNKNOWN)
+    }
+
+    /// What the joints do at `q`, when they came from these sides. Terms count as a change of the offsets, so that an arm without any
+    /// pays for no more than one comparison.
+    pub(crate) fn motions_approached(&self, q: &JointVector<S>, approach: Approach) -> [Motion<S>; MAX_JOINTS] {
+        let displaced;
+        let encoders = match &self.terms {
+            None => &self.encoders,
+            Some(terms) => {
+                displaced = self.displaced_encoders(terms, q, approach);
+                &displaced
+            }
+        };
+        self.motions_of(encoders, q)
+    }
+
+    /// What the joints do at `θ = offset + scale · q`.
+    pub(crate) fn rigid_motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
+        self.motions_of(&self.encoders, q)
+    }
+
+    fn motions_of(&self, encoders: &[Joint<S>; MAX_JOINTS], q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
         let mut motions = [Motion::Slide { distance_m: S::zero() }; MAX_JOINTS];
-        for ((motion, encoder), q) in motions.iter_mut().zip(&self.encoders[..self.joints]).zip(&q.0) {
+        for ((motion, encoder), q) in motions.iter_mut().zip(&encoders[..self.joints]).zip(&q.0) {
             *motion = Motion::new(encoder, *q);
         }
         motions
     }
 
-    fn sweep_out(&self, motions: &[Motion<S>; MAX_JOINTS], point_tool_m: &Vector3<S>) -> Vector3<S> {
+    /// The joints, with what the terms add at `q` added to their offsets.
+    #[cold]
+    #[inline(never)]
+    fn displaced_encoders(&self, terms: &JointTerms<S>, q: &JointVector<S>, approach: Approach) -> [Joint<S>; MAX_JOINTS] {
+        let mut encoders = self.encoders;
+        let displacements = terms.displacements(q, &terms.loads(self, q), approach);
+        for (encoder, displacement) in encoders.iter_mut().zip(displacements.0) {
+            encoder.offset += displacement;
+        }
+        encoders
+    }
+
+    pub(crate) fn sweep_out(&self, motions: &[Motion<S>; MAX_JOINTS], point_tool_m: &Vector3<S>) -> Vector3<S> {
         let mut point_m = self.links[self.joints].point(*point_tool_m);
         for (link, motion) in self.links[..self.joints].iter().zip(&motions[..self.joints]).rev() {
             point_m = link.point(motion.point(point_m));
@@ -183,7 +260,7 @@ impl<S: Real> Kinematics<S> {
     /// Pushes a wrench from the base down the chain. In each frame on its way the wrench's components are the columns:
     /// a translation's column is the force, a rotation's its moment about that rotation's axis, an offset's the z moment
     /// (revolute) or z force (prismatic), and the scale's is `q` times the offset's.
-    fn sweep_wrench(
+    pub(crate) fn sweep_wrench(
         &self,
         q: &JointVector<S>,
         motions: &[Motion<S>; MAX_JOINTS],
@@ -272,6 +349,22 @@ impl<S: Real> Motion<S> {
         match *self {
             Self::Turn { .. } => self.direction(p),
             Self::Slide { distance_m } => Vector3::new(p.x, p.y, p.z + distance_m),
+        }
+    }
+
+    /// A direction before the joint, seen from behind it.
+    pub(crate) fn direction_behind(&self, v: Vector3<S>) -> Vector3<S> {
+        match *self {
+            Self::Turn { sin, cos } => Self::Turn { sin: -sin, cos }.direction(v),
+            Self::Slide { .. } => v,
+        }
+    }
+
+    /// A first moment of mass (kg m) behind the joint, seen from before it.
+    pub(crate) fn moved_moment(&self, first_kg_m: Vector3<S>, mass_kg: S) -> Vector3<S> {
+        match *self {
+            Self::Turn { .. } => self.direction(first_kg_m),
+            Self::Slide { distance_m } => Vector3::new(first_kg_m.x, first_kg_m.y, first_kg_m.z + distance_m * mass_kg),
         }
     }
 

@@ -8,6 +8,7 @@
 //! counters ──ExtendedCounter──▶ Sample ──SettleDetector──▶ SettledPose ──JointEncoders::q, LvdtCurve──▶ q, length
 //!
 //! Chain ──Kinematics::new──▶ Kinematics ──residual_row(Measurement)──▶ residual f, row ∂d/∂p
+//! JointTerms ──with_terms──────▲
 //!                                                                           │ NormalEquations::add
 //! new parameters ◀──Chain::apply── Step ◀──DampedSolver::solve(λ)── JᵀWJ, JᵀWf
 //! ```
@@ -18,20 +19,27 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod approach;
 mod chain;
+mod configuration;
 mod crc32;
 mod kinematics;
+mod loads;
 mod normal;
 mod parameter;
 mod real;
 mod sensing;
 mod step;
+mod terms;
 mod trig;
 pub mod wire;
 
+pub use approach::{Approach, Direction};
 pub use chain::{Chain, ChainError, Joint, JointKind, JointVector, Link};
+pub use configuration::Configuration;
 pub use crc32::{crc32, crc32_digest};
 pub use kinematics::{Extent, Kinematics, Measurement, Pairing, Pose};
+pub use loads::{Body, Masses, STANDARD_GRAVITY_M_S2};
 pub use normal::{FreeParameters, FreeParametersError, FreeSetMismatch, NormalEquations};
 pub use parameter::{Parameter, ParameterKind, ParameterUnit, UnknownParameter};
 pub use real::Real;
@@ -40,6 +48,7 @@ pub use sensing::{
     LvdtCurve, LvdtFault, LvdtReading, MAX_COUPLINGS, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria,
 };
 pub use step::{DampedSolver, Damping, NotPositiveDefinite, Step};
+pub use terms::{JointTerms, TERMS_PER_JOINT, TermKind, TermsError, term_basis};
 pub use trig::sin_cos_f32;
 
 /// Three-vector of metres or of unit-free direction components.

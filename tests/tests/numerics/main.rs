@@ -6,6 +6,7 @@ mod designs;
 mod golden;
 mod gradients;
 mod identification;
+mod joint_terms;
 mod normal_equations;
 mod precision;
 mod ranks;
