@@ -202,11 +202,12 @@ impl<S: Real> JointTerms<S> {
                 if *value == S::zero() {
                     continue;
                 }
+                // What is not a number is not within it.
+                let is_small = value.abs() <= S::nearest(term.largest());
                 let error = match kinds.get(joint) {
                     None => Some(TermsError::NoSuchJoint { joint }),
                     Some(JointKind::Prismatic) if term.is_eccentricity() => Some(TermsError::EccentricSlide { joint }),
-                    // Not written the other way round, which would let pass what is not a number.
-                    _ if !(value.abs() <= S::nearest(term.largest())) => Some(TermsError::Size { joint, term }),
+                    _ if !is_small => Some(TermsError::Size { joint, term }),
                     _ if term == TermKind::Compliance && !self.masses.load_joint(joint) => Some(TermsError::NoLoad { joint }),
                     _ => None,
                 };

@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::hold::parse_hold;
-use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
+use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm, refuse_terms};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, largest_text, print, write_calibrated};
 use crate::documents::{FitDocument, Fitted, HeldOutRows, ParameterLine};
@@ -81,6 +81,7 @@ impl FitArgs {
         };
         check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
+        refuse_terms(&measured.robot, "fit")?;
         let Measured { robot, rig, dataset, .. } = &measured;
         let fit = fit(robot, dataset, &FitOptions { hold, damping }).map_err(Remedied)?;
         let unseen: Vec<(String, &Dataset)> = measured.unseen().into_iter().collect();

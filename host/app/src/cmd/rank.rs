@@ -4,7 +4,7 @@ use ballbar_calib::identify::{Identifiability, bound_by_pairings, remarks};
 use clap::Args;
 use serde::Serialize;
 
-use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs};
+use super::inputs::{ListError, Measured, MeasuredArgs, OutputArgs, refuse_terms};
 use super::outcome::{CommandError, Outcome};
 use super::pairings::parse_pairings;
 use super::report::{Report, print};
@@ -49,6 +49,7 @@ struct RankReport {
 impl RankArgs {
     pub(super) fn run(&self) -> Result<Outcome, CommandError> {
         let mut measured = self.measured.read()?;
+        refuse_terms(&measured.robot, "rank")?;
         if let Some(list) = &self.pairings {
             let pairings = parse_pairings(list, &measured.rig)?;
             let had: Vec<String> =

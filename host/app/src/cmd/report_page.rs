@@ -11,7 +11,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::hold::parse_hold;
-use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
+use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm, refuse_terms};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_files};
 use crate::files::{FileKind, Output, read_poses};
@@ -108,6 +108,7 @@ impl ReportArgs {
         let hold = parse_hold(&self.hold)?;
         check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
+        refuse_terms(&measured.robot, "report")?;
         let others = self.others(&measured)?;
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;

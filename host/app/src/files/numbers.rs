@@ -29,6 +29,8 @@ pub(super) enum Range {
     Positive,
     /// A standard deviation in millimetres: a nanometre to a kilometre.
     Deviation,
+    /// A mass in kilograms.
+    Mass,
     /// A joint's scale.
     Scale,
     /// Encoder counts per turn or millimetre.
@@ -47,6 +49,7 @@ impl Range {
             Self::Plausible => x.abs() <= MOST,
             Self::Positive => x > 0.0 && x <= MOST,
             Self::Deviation => (1e-6..=MOST).contains(&x),
+            Self::Mass => (0.0..=1e5).contains(&x),
             Self::Scale => (1e-3..=1e3).contains(&x.abs()),
             Self::Counts => x > 0.0 && x <= 1e12,
             Self::IndexCounts => (16.0..=1e6).contains(&x) && x.fract() == 0.0,
@@ -60,6 +63,7 @@ impl Range {
             Self::Plausible => "a number from -1e6 to 1e6",
             Self::Positive => "a number above 0, at most 1e6",
             Self::Deviation => "a number from 1e-6 to 1e6",
+            Self::Mass => "a number from 0 to 1e5",
             Self::Scale => "a number of size 0.001 to 1000",
             Self::Counts => "a number above 0, at most 1e12",
             Self::IndexCounts => "a whole number from 16 to 1e6",

@@ -38,7 +38,9 @@ pub use offsets::{Offset, farthest_offset};
 pub use postures::postures;
 pub(crate) use residual::median;
 pub use residual::{Residual, ResidualSummary};
-pub use residuals::{ALIKE, Outlier, OutlierTest, PairingResiduals, by_pairing, neighbour_correlation, outliers, residuals};
+pub use residuals::{
+    ALIKE, Outlier, OutlierTest, PairingResiduals, by_pairing, neighbour_correlation, outliers, residuals, residuals_by,
+};
 pub use spectrum::{RANK_THRESHOLD, Spectrum};
 pub use trend::Trend;
 pub use uncertainty::Uncertainty;

@@ -18,7 +18,11 @@ pub struct PairingResiduals {
 
 /// Residuals of all rows, in their order.
 pub fn residuals(chain: &Chain<f64>, dataset: &Dataset) -> Vec<Residual> {
-    let kinematics = Kinematics::new(chain);
+    residuals_by(&Kinematics::new(chain), dataset)
+}
+
+/// Residuals of all rows by kinematics that may have joint terms, in their order.
+pub fn residuals_by(kinematics: &Kinematics<f64>, dataset: &Dataset) -> Vec<Residual> {
     let of = |row: &PoseRow| Residual { value_m: kinematics.residual(&row.measurement), weight: row.measurement.weight };
     dataset.rows.iter().map(of).collect()
 }

@@ -1,13 +1,17 @@
 //! Origins, axes and ends of all links at one joint vector.
 
-use ballbar::{Chain, Joint, JointKind, JointVector, MAX_JOINTS, Matrix3, Pose, Vector3};
+use ballbar::{Approach, Chain, Joint, JointKind, JointTerms, JointVector, Kinematics, MAX_JOINTS, Matrix3, Pose, Vector3};
 use nalgebra::Rotation3;
+
+use crate::model::Robot;
 
 /// A chain made ready for questions about its links.
 #[derive(Clone, Debug)]
 pub struct Skeleton {
     links: Vec<LinkTransform>,
     encoders: Vec<Joint<f64>>,
+    /// Of joints that have any, with what their loads are computed by.
+    terms: Option<Box<(JointTerms<f64>, Kinematics<f64>)>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +100,26 @@ impl Skeleton {
         Self {
             links: (0..=chain.joints()).filter_map(|i| chain.link(i)).map(link).collect(),
             encoders: (0..chain.joints()).filter_map(|i| chain.joint(i)).collect(),
+            terms: None,
         }
+    }
+
+    /// Prepares a robot: its chain, with the terms of its joints. Of backlash the middle is taken.
+    pub fn of(robot: &Robot) -> Self {
+        let terms = (!robot.terms.are_zero()).then(|| Box::new((robot.terms, Kinematics::new(&robot.chain))));
+        Self { terms, ..Self::new(&robot.chain) }
+    }
+
+    /// Whether the joints' angles are more than offset and scale make them.
+    pub fn has_terms(&self) -> bool {
+        self.terms.is_some()
+    }
+
+    fn displacements(&self, q: &JointVector<f64>) -> JointVector<f64> {
+        self.terms.as_ref().map_or(JointVector::zero(), |of_joints| {
+            let (terms, rigid) = &**of_joints;
+            terms.displacements(q, &terms.loads(rigid, q), Approach::UNKNOWN)
+        })
     }
 
     /// Number of joints.
@@ -128,6 +151,7 @@ impl Skeleton {
             ends_m: [Vector3::zeros(); MAX_JOINTS + 1],
             base_from_tool: Pose { rotation: Matrix3::identity(), translation_m: Vector3::zeros() },
         };
+        let displacements = self.displacements(q);
         let (mut rotation, mut origin_m) = (Matrix3::identity(), Vector3::zeros());
         for (i, link) in self.links.iter().enumerate() {
             posture.starts_m[i] = origin_m;
@@ -138,7 +162,7 @@ impl Skeleton {
             let Some(encoder) = self.encoders.get(i) else { continue };
             let direction: Vector3<f64> = rotation.column(2).into();
             posture.axes[i] = Axis { kind: encoder.kind, point_m: origin_m, direction, scale: encoder.scale };
-            let theta = encoder.offset + encoder.scale * q.as_array()[i];
+            let theta = encoder.offset + encoder.scale * q.as_array()[i] + displacements.as_array()[i];
             match encoder.kind {
                 JointKind::Revolute => turn_about_z(&mut rotation, theta),
                 JointKind::Prismatic => origin_m += direction * theta,

@@ -132,7 +132,7 @@ impl<'a> Cell<'a> {
             travel_m,
             margins,
             pace,
-            kinematics: Kinematics::new(&robot.chain),
+            kinematics: robot.kinematics(),
             scales: parameters.clone().map(scale).collect(),
             deviations: parameters.map(deviation).collect(),
             arm_m: behind_m.max(f64::MIN_POSITIVE),
