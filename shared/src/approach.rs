@@ -63,6 +63,13 @@ impl Approach {
         self
     }
 
+    /// The same with the ways of these joints turned about; bit i is joint i.
+    #[must_use]
+    pub fn reversed(self, joints: u8) -> Self {
+        let turned = |own, other| own & !joints | other & joints;
+        Self { rising: turned(self.rising, self.falling), falling: turned(self.falling, self.rising) }
+    }
+
     /// One of `+`, `-` and `0` for each of the first `joints`.
     pub fn signs(self, joints: usize) -> impl fmt::Display {
         Signs { approach: self, joints }
@@ -108,6 +115,7 @@ mod tests {
             .with(8, Some(Direction::Rising));
         assert_eq!(approach.signs(5).to_string(), "+0-00");
         assert_eq!([0, 1, 2, 3, 8, 64].map(|joint| approach.sign::<f64>(joint)), [1.0, 0.0, -1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(approach.reversed(0b110).signs(5).to_string(), "+0+00");
         let contradiction = Approach { rising: 1, falling: 1 };
         assert_eq!(contradiction.direction(0), None);
     }

@@ -100,7 +100,11 @@ impl<S: Real> Kinematics<S> {
 
     /// The same with what the joints' terms add to their angles. Where no approach is given, none is known.
     pub fn with_terms(chain: &Chain<S>, terms: &JointTerms<S>) -> Self {
-        Self { terms: (!terms.are_zero()).then_some(*terms), ..Self::new(chain) }
+        let mut kinematics = Self::new(chain);
+        if !terms.are_zero() {
+            kinematics.terms = Some(*terms);
+        }
+        kinematics
     }
 
     /// The chain at encoder outputs `q`, approached so: for whoever knows the approach, or asks for more than one thing.

@@ -78,7 +78,7 @@ pub fn term_basis<S: Real>(q: S, load: S, direction: S) -> [S; TERMS_PER_JOINT] 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound(serialize = "S: Scalar + Serialize", deserialize = "S: Scalar + Deserialize<'de>"))]
 pub struct JointTerms<S> {
-    coefficients: [[S; TERMS_PER_JOINT]; MAX_JOINTS],
+    pub(crate) coefficients: [[S; TERMS_PER_JOINT]; MAX_JOINTS],
     /// What pulls at the joints.
     pub masses: Masses<S>,
 }
@@ -90,30 +90,30 @@ pub enum TermsError {
     /// The coefficient is no number, or larger than any joint has: 0.1 rad or m, compliance 0.01 rad/Nm or m/N.
     Size {
         /// The joint.
-        joint: usize,
+        joint: u8,
         /// Its term.
         term: TermKind,
     },
     /// A prismatic joint has no disc that could be eccentric.
     EccentricSlide {
         /// The joint.
-        joint: usize,
+        joint: u8,
     },
     /// Compliance of a joint of which no mass is known that it bears.
     NoLoad {
         /// The joint.
-        joint: usize,
+        joint: u8,
     },
     /// A term of a joint that the chain does not have, or a link behind it.
     NoSuchJoint {
         /// The joint.
-        joint: usize,
+        joint: u8,
     },
     /// A mass is below zero, no number, or above 100 t, or its centre lies more than 100 m from its frame. Link `joint + 2`, or the payload,
     /// which follows the last of them.
     Mass {
         /// The joint that moves it, or the number of joints for the payload.
-        joint: usize,
+        joint: u8,
     },
     /// Gravity is no number or above 100 m/s².
     Gravity,
@@ -126,18 +126,18 @@ impl fmt::Display for TermsError {
                 f,
                 "{}{} is out of range: {} in size at most, in rad, m, rad/Nm or m/N",
                 term.name(),
-                joint + 1,
+                usize::from(joint) + 1,
                 term.largest()
             ),
             Self::EccentricSlide { joint } => {
-                write!(f, "joint {} is prismatic and can have no eccentricity", joint + 1)
+                write!(f, "joint {} is prismatic and can have no eccentricity", usize::from(joint) + 1)
             }
             Self::NoLoad { joint } => {
-                write!(f, "joint {} has a compliance, but no mass is known that it bears", joint + 1)
+                write!(f, "joint {} has a compliance, but no mass is known that it bears", usize::from(joint) + 1)
             }
-            Self::NoSuchJoint { joint } => write!(f, "terms of joint {}, which is not there", joint + 1),
+            Self::NoSuchJoint { joint } => write!(f, "terms of joint {}, which is not there", usize::from(joint) + 1),
             Self::Mass { joint } => {
-                write!(f, "the mass behind joint {} is not within 0 to 100 t, or not within 100 m of it", joint + 1)
+                write!(f, "the mass behind joint {} is not within 0 to 100 t, or not within 100 m of it", usize::from(joint) + 1)
             }
             Self::Gravity => f.write_str("gravity is not within 100 m/s²"),
         }
@@ -154,7 +154,13 @@ impl<S: Real> JointTerms<S> {
 
     /// Whether all coefficients are zero: the angles are `offset + scale · q`.
     pub fn are_zero(&self) -> bool {
-        self.coefficients.as_flattened().iter().all(|value| *value == S::zero())
+        (0..MAX_JOINTS).all(|joint| self.is_plain(joint))
+    }
+
+    /// Whether a joint has no terms. Not inlined, so that it is in the board's flash once.
+    #[inline(never)]
+    fn is_plain(&self, joint: usize) -> bool {
+        self.of_joint(joint).iter().all(|value| *value == S::zero())
     }
 
     /// Coefficient `a` of a term of joint `joint`, from 0: radians or metres, of compliance per Nm or N. Zero beyond [`MAX_JOINTS`].
@@ -197,24 +203,24 @@ impl<S: Real> JointTerms<S> {
     /// [`TermsError`] with the first thing that is wrong.
     pub fn check(&self, kinds: &[JointKind]) -> Result<(), TermsError> {
         self.check_masses(kinds.len())?;
-        for (joint, of_joint) in self.coefficients.iter().enumerate() {
-            for (term, value) in TermKind::ALL.into_iter().zip(of_joint) {
-                if *value == S::zero() {
-                    continue;
-                }
-                // What is not a number is not within it.
-                let is_small = value.abs() <= S::nearest(term.largest());
-                let error = match kinds.get(joint) {
-                    None => Some(TermsError::NoSuchJoint { joint }),
-                    Some(JointKind::Prismatic) if term.is_eccentricity() => Some(TermsError::EccentricSlide { joint }),
-                    _ if !is_small => Some(TermsError::Size { joint, term }),
-                    _ if term == TermKind::Compliance && !self.masses.load_joint(joint) => Some(TermsError::NoLoad { joint }),
-                    _ => None,
-                };
-                error.map_or(Ok(()), Err)?;
-            }
+        (0..MAX_JOINTS * TERMS_PER_JOINT)
+            .try_for_each(|i| self.check_coefficient(kinds, i / TERMS_PER_JOINT, TermKind::ALL[i % TERMS_PER_JOINT]))
+    }
+
+    /// Not inlined, so that it is in the board's flash once and not unrolled.
+    #[inline(never)]
+    fn check_coefficient(&self, kinds: &[JointKind], i: usize, term: TermKind) -> Result<(), TermsError> {
+        let (value, joint) = (self.coefficient(i, term), i as u8);
+        // What is not a number is not within it.
+        let is_small = value.abs() <= S::nearest(term.largest());
+        match kinds.get(i) {
+            _ if value == S::zero() => Ok(()),
+            None => Err(TermsError::NoSuchJoint { joint }),
+            Some(JointKind::Prismatic) if term.is_eccentricity() => Err(TermsError::EccentricSlide { joint }),
+            _ if !is_small => Err(TermsError::Size { joint, term }),
+            _ if term == TermKind::Compliance && !self.masses.load_joint(i) => Err(TermsError::NoLoad { joint }),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn check_masses(&self, joints: usize) -> Result<(), TermsError> {
@@ -226,10 +232,10 @@ impl<S: Real> JointTerms<S> {
                 && body.mass_kg <= S::nearest(MAX_MASS_KG)
                 && body.center_m.norm() <= S::nearest(MAX_CENTER_M);
             if !is_possible {
-                return Err(TermsError::Mass { joint: joint.min(joints) });
+                return Err(TermsError::Mass { joint: joint.min(joints) as u8 });
             }
             if joint >= joints && joint < MAX_JOINTS && body.mass_kg > S::zero() {
-                return Err(TermsError::NoSuchJoint { joint });
+                return Err(TermsError::NoSuchJoint { joint: joint as u8 });
             }
         }
         let is_possible = self.masses.gravity_base_m_s2.norm() <= S::nearest(MAX_GRAVITY_M_S2);

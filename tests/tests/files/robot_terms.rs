@@ -8,6 +8,7 @@ use ballbar_calib::model::{Calibration, CalibrationVerdict, Robot};
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::naive;
 use ballbar_tests::shells::runs;
+use host_cal::board::{NOMINAL_TRAVEL_M, nominal_lvdt, parameter_set, rounding_of_kinematics};
 use host_cal::files::{ROBOTS, Source, calibrated_toml, open_robot, parse_robot};
 use num_complex::Complex;
 use rand::SeedableRng;
@@ -110,6 +111,20 @@ fn the_tool_is_where_the_terms_put_it() {
     let rigid = runs(&folder, &[&["fk", "--robot", "puma560", "--q", "10,-40,100,20,-30,50", "--json"]]);
     let moved_mm = (rigid.json()["position_mm"][2].as_f64().unwrap() - expected[(2, 3)].re * 1e3).abs();
     assert!((0.05..3.0).contains(&moved_mm), "{moved_mm}");
+}
+
+/// As the board computes, with every mixture of joints that rose and that fell.
+#[test]
+fn a_board_is_given_the_terms_and_computes_with_them() {
+    let text = with_terms("puma560");
+    let robot = robot(&text);
+    let set = parameter_set(&robot, nominal_lvdt(NOMINAL_TRAVEL_M)).unwrap();
+    let difference = rounding_of_kinematics(&robot.kinematics(), &robot.limits, &set.compile().unwrap(), 500);
+    assert!(difference.is_small(), "{difference:?}");
+    let rigid = parameter_set(&open_robot("puma560").unwrap(), set.lvdt).unwrap();
+    assert!(rigid.terms.is_empty());
+    let left_out = rounding_of_kinematics(&robot.kinematics(), &robot.limits, &rigid.compile().unwrap(), 500);
+    assert!(left_out.position_m > 1e-4, "{left_out:?}");
 }
 
 /// With the closed form of a PUMA, and by steps of a UR5e.

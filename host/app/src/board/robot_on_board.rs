@@ -1,6 +1,6 @@
 //! A robot's file as the board's parameters, and the board's parameters as something to compute with in f64.
 
-use ballbar::wire::{Answer, Command, ParameterSet, Refusal, Status, WhichSet};
+use ballbar::wire::{Answer, Command, ParameterSet, Refusal, Status, WhichSet, term_numbers};
 use ballbar::{Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose};
 use ballbar_calib::model::Robot;
 use miette::Diagnostic;
@@ -49,6 +49,7 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
             .take(ballbar::MAX_COUPLINGS)
             .collect(),
         lvdt,
+        terms: term_numbers(&robot.terms, robot.chain.joints()),
     };
     let unfit = |reason: String| SetError::Unfit { robot: robot.source.as_str().to_owned(), reason };
     if robot.encoders.iter().map(|facts| facts.couplings.len()).sum::<usize>() > ballbar::MAX_COUPLINGS {

@@ -118,12 +118,12 @@ impl<'a> TermsReader<'a> {
     }
 
     fn place_of(&self, error: TermsError) -> Option<Range<usize>> {
-        let term = |joint: usize, term: TermKind| self.places.get(joint)?[term as usize].clone();
+        let term = |joint: u8, term: TermKind| self.places.get(usize::from(joint))?[term as usize].clone();
         match error {
             TermsError::Size { joint, term: kind } => term(joint, kind),
             TermsError::EccentricSlide { joint } => term(joint, TermKind::SinQ),
             TermsError::NoLoad { joint } => term(joint, TermKind::Compliance),
-            TermsError::Mass { joint } => self.masses.get(joint)?.clone(),
+            TermsError::Mass { joint } => self.masses.get(usize::from(joint))?.clone(),
             _ => None,
         }
     }
