@@ -104,6 +104,7 @@ pub fn fitted(design: &Robot, rig: &Rig, seed: u64) -> Robot {
         PoseRow {
             pairing: id,
             measurement: Measurement { pairing, q, length_m, weight: 1.0 },
+            approach: ballbar::Approach::UNKNOWN,
             sigma_m: None,
             set: None,
             t_s: None,

@@ -2,14 +2,15 @@
 
 use std::fs;
 
-use ballbar::{Approach, STANDARD_GRAVITY_M_S2, TermKind, Vector3};
+use ballbar::{Approach, Direction, STANDARD_GRAVITY_M_S2, TermKind, Vector3};
+use ballbar_calib::identify::residuals_by;
 use ballbar_calib::kinematics::{InverseKinematics, Thoroughness, apart};
-use ballbar_calib::model::{Calibration, CalibrationVerdict, Robot};
+use ballbar_calib::model::{Calibration, CalibrationVerdict, Dataset, Robot};
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::naive;
 use ballbar_tests::shells::runs;
 use host_cal::board::{NOMINAL_TRAVEL_M, nominal_lvdt, parameter_set, rounding_of_kinematics};
-use host_cal::files::{ROBOTS, Source, calibrated_toml, open_robot, parse_robot};
+use host_cal::files::{ROBOTS, Source, append_poses, calibrated_toml, open_rig, open_robot, parse_robot};
 use num_complex::Complex;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -167,6 +168,42 @@ fn simulated_lengths_have_the_terms_and_only_robots_with_them_explain_these() {
     };
     assert!(rms_mm("arm.toml") < 1e-5, "{}", rms_mm("arm.toml"));
     assert!(rms_mm("puma560") > 0.1, "{}", rms_mm("puma560"));
+}
+
+/// Lengths of joints with backlash fit where the file says from which sides they came, and only there.
+#[test]
+fn the_approach_of_each_row_counts() {
+    let robot = robot(&with_terms("puma560"));
+    let (rig, kinematics) = (open_rig("triangles").unwrap(), robot.kinematics());
+    let pairing = rig.all_pairings()[0];
+    let signs = ["+-0+-+", "-+0-+-", "000000", ""];
+    let row = |(i, signs): (usize, &&str)| {
+        let q = [0.3, -0.7, 1.4, 0.2, -0.5, 0.9].map(|q| q + 0.1 * i as f64);
+        let approach = signs.chars().enumerate().fold(Approach::UNKNOWN, |approach, (joint, sign)| {
+            let direction = [('+', Direction::Rising), ('-', Direction::Falling)].into_iter().find(|(own, _)| *own == sign);
+            approach.with(joint, direction.map(|(_, direction)| direction))
+        });
+        let vector = robot.chain.joint_vector(&q).unwrap();
+        let length_m = kinematics.configuration(&vector, approach).length(&rig.pairing(pairing));
+        let q_deg = q.map(|q| q.to_degrees().to_string()).join(",");
+        format!("A,1,{q_deg},{},{signs}\n", length_m * 1e3)
+    };
+    let rows: String = signs.iter().enumerate().map(row).collect();
+    let text = format!("chuck,sphere,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,length_mm,approach\n{rows}");
+    let read = |text: &str| {
+        let mut dataset = Dataset::default();
+        append_poses(&mut dataset, &Source::new("poses.csv", text), &robot, &rig).map(|()| dataset)
+    };
+    let largest_m = |text: &str| {
+        let residuals = residuals_by(&kinematics, &read(text).unwrap());
+        residuals.iter().map(|residual| residual.value_m.abs()).fold(0.0, f64::max)
+    };
+    assert!(largest_m(&text) < 1e-9, "{}", largest_m(&text));
+    assert!(largest_m(&text.replace("+-0+-+", "").replace("-+0-+-", "")) > 5e-5);
+    for bad in ["+-0+-", "+-0+-+0", "+-0+-x"] {
+        let error = read(&text.replace("+-0+-+", bad)).unwrap_err().to_string();
+        assert!(error.starts_with("poses.csv:2: column `approach`"), "{error}");
+    }
 }
 
 #[test]

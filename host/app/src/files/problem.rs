@@ -132,6 +132,14 @@ pub enum Problem {
         /// The key that is not.
         missing: &'static str,
     },
+    /// No sign, or not one for each joint.
+    #[error("column `approach`: `{found}`, expected one of +, - and 0 for each of {joints} joints")]
+    Approach {
+        /// What stands there.
+        found: String,
+        /// Joints of the robot.
+        joints: usize,
+    },
     /// A direction of gravity that is none.
     #[error("`gravity` has no direction")]
     NoGravity,
@@ -341,6 +349,9 @@ impl Problem {
                 "The keys of joint terms and masses, and their units, are in docs/files.md."
             }
             Self::Eccentricity { .. } => "They are the coefficients of sin q, cos q, sin 2q and cos 2q.",
+            Self::Approach { .. } => {
+                "+ where the joint's value rose on the way there, - where it fell, 0 where that is not known: +-00+-"
+            }
             Self::NoGravity => {
                 "It is the direction in which things fall, in the base frame: gravity = [0, 0, -1] of a robot that stands upright."
             }

@@ -1,6 +1,6 @@
 //! Residuals of a set of poses: in all, by pairing, and those that stand out.
 
-use ballbar::{Chain, Kinematics};
+use ballbar::{Chain, Kinematics, Measurement};
 
 use super::residual::{Residual, ResidualSummary, median};
 use super::trend::correlation_of_neighbours;
@@ -23,7 +23,11 @@ pub fn residuals(chain: &Chain<f64>, dataset: &Dataset) -> Vec<Residual> {
 
 /// Residuals of all rows by kinematics that may have joint terms, in their order.
 pub fn residuals_by(kinematics: &Kinematics<f64>, dataset: &Dataset) -> Vec<Residual> {
-    let of = |row: &PoseRow| Residual { value_m: kinematics.residual(&row.measurement), weight: row.measurement.weight };
+    let of = |row: &PoseRow| {
+        let Measurement { pairing, q, length_m, weight } = &row.measurement;
+        let computed_m = kinematics.configuration(q, row.approach).length(pairing);
+        Residual { value_m: length_m - computed_m, weight: *weight }
+    };
     dataset.rows.iter().map(of).collect()
 }
 

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::fmt;
 
-use ballbar::{JointVector, Measurement};
+use ballbar::{Approach, JointVector, Measurement};
 use thiserror::Error;
 
 use super::rig::{PairingId, Rig};
@@ -17,6 +17,9 @@ pub struct PoseRow {
     pub pairing: PairingId,
     /// What was measured, SI units; the weight has mean 1 over the dataset.
     pub measurement: Measurement<f64>,
+    /// From which sides the joints came there, where it is known. Backlash depends on it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub approach: Approach,
     /// Standard deviation of the length, metres, where it is known.
     pub sigma_m: Option<f64>,
     /// The part of the measurements that the row belongs to, where they have parts.
@@ -89,7 +92,19 @@ impl PoseRow {
 
     /// A measurement with nothing else known of it.
     pub(crate) fn of(pairing: PairingId, measurement: Measurement<f64>) -> Self {
-        Self { pairing, measurement, sigma_m: None, set: None, t_s: None, bar_m: None, motion: None, file: 0, line: 0, number: 0 }
+        Self {
+            pairing,
+            measurement,
+            approach: Approach::UNKNOWN,
+            sigma_m: None,
+            set: None,
+            t_s: None,
+            bar_m: None,
+            motion: None,
+            file: 0,
+            line: 0,
+            number: 0,
+        }
     }
 }
 

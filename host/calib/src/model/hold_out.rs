@@ -117,6 +117,7 @@ mod tests {
             PoseRow {
                 pairing,
                 measurement: Measurement { pairing: rig.pairing(pairing), q: JointVector::zero(), length_m, weight: 1.0 },
+                approach: ballbar::Approach::UNKNOWN,
                 sigma_m: None,
                 set: None,
                 t_s: None,
