@@ -76,7 +76,7 @@ impl<'q, H: Hardware> Board<'q, H> {
     fn load_parameters(&mut self) {
         self.parameters = Parameters::load(self.hardware.flash());
         if let Some(active) = self.parameters.active() {
-            self.sensors.configure(active.encoders.encoders());
+            self.sensors.configure(active);
         }
         self.has_loaded = true;
     }

@@ -3,7 +3,7 @@
 use ballbar::wire::{
     Answer, Command, CurrentPose, LinkCounts, Refusal, Reply, Request, Status, StreamSelection, ToolPose, WhichSet,
 };
-use ballbar::{JointVector, StillnessCriteria};
+use ballbar::{Approach, JointVector, StillnessCriteria};
 use heapless::Vec;
 
 use crate::board::Board;
@@ -41,7 +41,7 @@ impl<H: Hardware> Board<'_, H> {
                 self.parameters.stage_lvdt(*curve, self.hardware.flash()).map(|crc| Answer::Staged { crc })
             }
             Command::CurrentPose => self.current_pose().map(Answer::CurrentPose),
-            Command::ForwardKinematics { set, q } => self.forward_kinematics(*set, q).map(Answer::Pose),
+            Command::ForwardKinematics { set, q, approach } => self.forward_kinematics(*set, q, *approach).map(Answer::Pose),
             action => self.act_once(id, action).map(|()| Answer::Done),
         }
     }
@@ -141,7 +141,7 @@ impl<H: Hardware> Board<'_, H> {
         }
         committed?;
         if let Some(active) = self.parameters.active() {
-            self.sensors.configure(active.encoders.encoders());
+            self.sensors.configure(active);
             if old_encoders.is_some_and(|old| old != active.encoders) {
                 self.sensors.forget_homing();
             }
@@ -157,12 +157,18 @@ impl<H: Hardware> Board<'_, H> {
             t_us: sample.t_us,
             homed: self.sensors.homed(),
             q: q.as_array()[..parameters.joints].iter().copied().collect(),
-            pose: parameters.tool_pose(&q).ok_or(Refusal::NotFinite)?,
+            approach: self.sensors.approach(),
+            pose: parameters.tool_pose(&q, self.sensors.approach()).ok_or(Refusal::NotFinite)?,
             displacement_m: parameters.lvdt.displacement_m(sample.lvdt).ok(),
         })
     }
 
-    fn forward_kinematics(&self, set: WhichSet, q: &Vec<f32, { ballbar::MAX_JOINTS }>) -> Result<ToolPose, Refusal> {
+    fn forward_kinematics(
+        &self,
+        set: WhichSet,
+        q: &Vec<f32, { ballbar::MAX_JOINTS }>,
+        approach: Approach,
+    ) -> Result<ToolPose, Refusal> {
         let parameters = self.parameters.compiled(set)?;
         if q.len() != parameters.joints {
             return Err(Refusal::Joint { joints: parameters.joints as u8 });
@@ -172,7 +178,7 @@ impl<H: Hardware> Board<'_, H> {
         }
         let mut vector = JointVector::zero();
         vector.as_array_mut()[..q.len()].copy_from_slice(q);
-        parameters.tool_pose(&vector).ok_or(Refusal::NotFinite)
+        parameters.tool_pose(&vector, approach).ok_or(Refusal::NotFinite)
     }
 
     fn status(&self) -> Status {

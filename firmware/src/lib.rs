@@ -14,6 +14,7 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod approach_watch;
 mod board;
 mod commands;
 mod conversation;

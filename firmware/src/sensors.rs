@@ -1,9 +1,10 @@
 //! What the main loop keeps of every encoder and the LVDT: homing, index checks, losses, and whether the arm stands still.
 
-use ballbar::wire::EncoderStatus;
-use ballbar::{Counts, Encoder, IndexCheck, Sample, SettleDetector, SettledPose, StillnessCriteria};
+use ballbar::wire::{CompiledParameters, EncoderStatus};
+use ballbar::{Approach, Counts, IndexCheck, Sample, SettleDetector, SettledPose, StillnessCriteria};
 use heapless::Vec;
 
+use crate::approach_watch::ApproachWatch;
 use crate::{ENCODERS, LatchedSample};
 
 /// An encoder at rest may flicker by so many counts.
@@ -15,6 +16,7 @@ pub(crate) struct Sensors {
     home_offsets: [i32; ENCODERS],
     homed: u8,
     index_checks: [IndexCheck; ENCODERS],
+    approach: ApproachWatch,
     detector: SettleDetector,
     latest: Option<Sample>,
     /// Where the encoders stood at the start, or when one of them last moved by more than its flicker.
@@ -31,6 +33,7 @@ impl Sensors {
             home_offsets: [0; ENCODERS],
             homed: 0,
             index_checks: [IndexCheck::default(); ENCODERS],
+            approach: ApproachWatch::new(),
             detector: SettleDetector::new(StillnessCriteria::default()),
             latest: None,
             stand: None,
@@ -64,6 +67,7 @@ impl Sensors {
             self.moved_at_us = Some(sample.t_us);
         }
         self.lvdt_faults = self.lvdt_faults.wrapping_add(u32::from(sample.lvdt.saturated));
+        self.approach.take(&sample.counts);
         let settled = self.detector.push(&sample);
         self.latest = Some(sample);
         settled
@@ -86,6 +90,7 @@ impl Sensors {
         self.homed |= 1 << i;
         self.index_checks[i].restart();
         self.detector.restart();
+        self.approach.preset(i, counts);
         // The jump is no motion.
         if let Some(place) = self.stand.as_mut().and_then(|stand| stand.get_mut(i)) {
             *place = counts;
@@ -93,9 +98,15 @@ impl Sensors {
         true
     }
 
+    /// From which sides the joints came to where they stand, as far as it was seen since start.
+    pub(crate) fn approach(&self) -> Approach {
+        self.approach.approach()
+    }
+
     /// Takes over what the parameters say of the encoders.
-    pub(crate) fn configure(&mut self, encoders: &[Encoder<f32>]) {
-        let spacings = encoders.iter().map(|encoder| encoder.counts_per_index).chain(core::iter::repeat(0));
+    pub(crate) fn configure(&mut self, parameters: &CompiledParameters) {
+        self.approach.configure(parameters);
+        let spacings = parameters.encoders.encoders().iter().map(|encoder| encoder.counts_per_index).chain(core::iter::repeat(0));
         for (check, counts_per_index) in self.index_checks.iter_mut().zip(spacings) {
             check.set_counts_per_index(counts_per_index);
         }

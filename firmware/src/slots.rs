@@ -5,12 +5,12 @@
 //! | bytes | |
 //! | --- | --- |
 //! | 0..4 | magic `BBPS` |
-//! | 4..8 | layout: hash of the set's type, so that a set of another layout is never misread |
+//! | 4..8 | layout: hash of the set's type, so that a set of another layout is never misread; that of the firmware before is read too |
 //! | 8..12 | sequence, one more at every commit |
 //! | 12..16 | length of the set, bytes |
 //! | 16..20 | CRC-32 over bytes 0 to 16 and the set |
 //! | 20.. | the set, padded with ones to the flash's word |
-//! | 1024.. | up to 16 renewals of 32 bytes, where the slot has room: a later sequence, CRC-32 over the set's CRC-32 and it, ones |
+//! | 1024.. | up to 16 renewals of 32 bytes, where the slot has room: a later sequence, CRC-32 over the CRC-32 of the set's bytes and it, ones |
 //!
 //! A commit erases and writes the older slot, the set first and its header last, and reads it back; the newer slot is not touched
 //! until then. Whatever byte the power fails at, the newer slot is whole, or the one just written is. The first commit ever writes
@@ -32,6 +32,11 @@ const LAYOUT: [u8; 4] = {
     let key = Key::for_path::<ParameterSet>("slot").to_bytes();
     [key[0], key[1], key[2], key[3]]
 };
+/// What the firmware of protocol 2 wrote, hashed as [`LAYOUT`] was then: a set without terms, which is the last field and may be missing.
+/// Such a slot is read, renewed and kept as one of this layout.
+const LAYOUT_WITHOUT_TERMS: [u8; 4] = [0xcb, 0xc2, 0x41, 0x8e];
+/// Terms of no numbers, as postcard writes them.
+const NO_TERMS: u8 = 0;
 const HEADER_BYTES: usize = 20;
 /// The longest set, with room to grow.
 const MAX_SET_BYTES: usize = 1004;
@@ -71,12 +76,12 @@ impl Slots {
     pub fn load(flash: &mut impl ParameterFlash) -> (Self, Option<ParameterSet>) {
         let [first, second] = [0, 1].map(|slot| read_slot(flash, slot).unwrap_or((SlotState::Damaged, None)));
         let slots = Self { states: [first.0, second.0] };
-        let set = match slots.newest() {
+        let stored = match slots.newest() {
             Some(0) => first.1,
             Some(_) => second.1,
             None => None,
         };
-        (slots, set)
+        (slots, stored.map(|stored| stored.set))
     }
 
     /// The two places.
@@ -103,7 +108,7 @@ impl Slots {
         for (slot, state) in self.states.iter_mut().enumerate() {
             let (found, stored) = read_slot(flash, slot)?;
             *state = found;
-            holds_it[slot] = stored.is_some_and(|stored| is_same(&stored, set));
+            holds_it[slot] = stored.is_some_and(|stored| is_same(&stored.set, set));
         }
         let sequence = self.active().map_or(0, |(sequence, _)| sequence.wrapping_add(1));
         let oldest = self.newest().map_or(0, |newest| 1 - newest);
@@ -124,7 +129,7 @@ impl Slots {
     pub fn read_previous(&self, flash: &mut impl ParameterFlash) -> Option<(u32, u32, ParameterSet)> {
         let (_, newest_crc) = self.active()?;
         match read_slot(flash, 1 - self.newest()?) {
-            Ok((SlotState::Good { sequence, crc }, Some(set))) if crc != newest_crc => Some((sequence, crc, set)),
+            Ok((SlotState::Good { sequence, crc }, Some(stored))) if crc != newest_crc => Some((sequence, crc, stored.set)),
             _ => None,
         }
     }
@@ -143,10 +148,10 @@ impl Slots {
     /// Makes a whole slot the newest as it stands; false where it has no room for another renewal. A flash that fails is no reason
     /// to erase the slot.
     fn renew<F: ParameterFlash>(&mut self, flash: &mut F, slot: usize, sequence: u32) -> Result<bool, CommitError> {
-        let SlotState::Good { crc, .. } = self.states[slot] else { return Ok(false) };
+        let (SlotState::Good { crc, .. }, Some(stored)) = read_slot(flash, slot)? else { return Ok(false) };
         let is_free = |at: &u32| read_renewal(flash, *at).is_ok_and(|bytes| bytes == [0xff; RENEWAL_BYTES]);
         let Some(free) = renewals::<F>(slot).find(is_free) else { return Ok(false) };
-        let written = flash.write(free, &renewal(crc, sequence));
+        let written = flash.write(free, &renewal(stored.bytes_crc, sequence));
         // What reads back counts, whatever the flash says of it: it is what the next start finds.
         let renewed = SlotState::Good { sequence, crc };
         if read_slot(flash, slot)?.0 == renewed {
@@ -169,7 +174,7 @@ impl Slots {
         write_image(flash, slot, &image, length).map_err(|()| CommitError::Flash)?;
         let (state, stored) = read_slot(flash, slot)?;
         self.states[slot] = state;
-        if stored.as_ref().is_some_and(|stored| is_same(stored, set)) { Ok(()) } else { Err(CommitError::ReadBack) }
+        if stored.as_ref().is_some_and(|stored| is_same(&stored.set, set)) { Ok(()) } else { Err(CommitError::ReadBack) }
     }
 }
 
@@ -219,28 +224,44 @@ fn write_image<F: ParameterFlash>(flash: &mut F, slot: usize, image: &Image, len
     flash.write(start, &image[..header]).map_err(|_| ())
 }
 
+/// A set in flash.
+struct Stored {
+    set: ParameterSet,
+    /// CRC-32 of its bytes as they stand there: of another layout not the set's.
+    bytes_crc: u32,
+}
+
 /// Not inlined, so that its kilobytes do not lie on the stack of every caller.
 #[inline(never)]
-fn read_slot<F: ParameterFlash>(flash: &mut F, slot: usize) -> Result<(SlotState, Option<ParameterSet>), CommitError> {
+fn read_slot<F: ParameterFlash>(flash: &mut F, slot: usize) -> Result<(SlotState, Option<Stored>), CommitError> {
     let mut image: Image = [0; SLOT_IMAGE_BYTES];
     let length = SLOT_IMAGE_BYTES.min(F::SLOT_BYTES as usize) / <F as ReadNorFlash>::READ_SIZE * <F as ReadNorFlash>::READ_SIZE;
     flash.read(slot as u32 * F::SLOT_BYTES, &mut image[..length]).map_err(|_| CommitError::Flash)?;
     if image[..HEADER_BYTES].iter().all(|&byte| byte == 0xff) {
         return Ok((SlotState::Empty, None));
     }
-    let Some((sequence, crc, set)) = parse(&image[..length]) else { return Ok((SlotState::Damaged, None)) };
-    let sequence = last_renewal(flash, slot, crc)?.unwrap_or(sequence);
-    Ok((SlotState::Good { sequence, crc }, Some(set)))
+    let Some((sequence, crc, stored)) = parse(&mut image[..length]) else { return Ok((SlotState::Damaged, None)) };
+    let sequence = last_renewal(flash, slot, stored.bytes_crc)?.unwrap_or(sequence);
+    Ok((SlotState::Good { sequence, crc }, Some(stored)))
 }
 
-fn parse(image: &[u8]) -> Option<(u32, u32, ParameterSet)> {
-    let word = |at: usize| Some(u32::from_le_bytes(image.get(at..at + 4)?.try_into().ok()?));
-    let length = usize::try_from(word(12)?).ok()?;
-    let image = image.get(..HEADER_BYTES.checked_add(length)?)?;
-    let is_valid = image[0..4] == MAGIC && image[4..8] == LAYOUT && image_crc(image) == word(16)?;
-    let payload = &image[HEADER_BYTES..];
-    let set = is_valid.then(|| ballbar::wire::decode(payload))??;
-    Some((word(8)?, crc32(payload), set))
+/// Sequence, CRC-32 of the set as this firmware writes it, and the set.
+fn parse(image: &mut [u8]) -> Option<(u32, u32, Stored)> {
+    let word = |image: &[u8], at: usize| Some(u32::from_le_bytes(image.get(at..at + 4)?.try_into().ok()?));
+    let (sequence, length, crc) = (word(image, 8)?, word(image, 12)?, word(image, 16)?);
+    let mut end = HEADER_BYTES.checked_add(usize::try_from(length).ok()?)?;
+    let written = image.get(..end)?;
+    let lacks_terms = written[4..8] == LAYOUT_WITHOUT_TERMS;
+    if written[0..4] != MAGIC || !(lacks_terms || written[4..8] == LAYOUT) || image_crc(written) != crc {
+        return None;
+    }
+    let bytes_crc = crc32(&written[HEADER_BYTES..]);
+    if lacks_terms {
+        *image.get_mut(end)? = NO_TERMS;
+        end += 1;
+    }
+    let payload = &image[HEADER_BYTES..end];
+    Some((sequence, crc32(payload), Stored { set: ballbar::wire::decode(payload)?, bytes_crc }))
 }
 
 /// Where a slot's renewals are.
@@ -252,11 +273,11 @@ fn renewals<F: ParameterFlash>(slot: usize) -> impl Iterator<Item = u32> {
     (0..count).map(move |i| slot as u32 * F::SLOT_BYTES + (SLOT_IMAGE_BYTES + i * RENEWAL_BYTES) as u32)
 }
 
-/// A later sequence for the set with this CRC-32.
-fn renewal(set_crc: u32, sequence: u32) -> [u8; RENEWAL_BYTES] {
+/// A later sequence for the set whose bytes have this CRC-32.
+fn renewal(bytes_crc: u32, sequence: u32) -> [u8; RENEWAL_BYTES] {
     let mut bytes = [0xff; RENEWAL_BYTES];
     let mut digest = crc32_digest();
-    digest.update(&set_crc.to_le_bytes());
+    digest.update(&bytes_crc.to_le_bytes());
     digest.update(&sequence.to_le_bytes());
     bytes[..4].copy_from_slice(&sequence.to_le_bytes());
     bytes[4..8].copy_from_slice(&digest.finalize().to_le_bytes());
@@ -270,12 +291,12 @@ fn read_renewal<F: ParameterFlash>(flash: &mut F, at: u32) -> Result<[u8; RENEWA
 }
 
 /// The sequence of the last renewal that is whole.
-fn last_renewal<F: ParameterFlash>(flash: &mut F, slot: usize, set_crc: u32) -> Result<Option<u32>, CommitError> {
+fn last_renewal<F: ParameterFlash>(flash: &mut F, slot: usize, bytes_crc: u32) -> Result<Option<u32>, CommitError> {
     let mut last = None;
     for at in renewals::<F>(slot) {
         let bytes = read_renewal(flash, at)?;
         let sequence = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-        if bytes == renewal(set_crc, sequence) {
+        if bytes == renewal(bytes_crc, sequence) {
             last = Some(sequence);
         }
     }

@@ -107,7 +107,7 @@ impl Streamer {
     fn take_pose(&mut self, sample: &Sample, parameters: &CompiledParameters, sensors: &Sensors, outbox: &mut Outbox) {
         let q = parameters.encoders.q(sample.counts.iter().map(|&counts| counts as f32));
         // One that is no number is not streamed: a gap in the indices.
-        let Some(pose) = parameters.tool_pose(&q) else { return };
+        let Some(pose) = parameters.tool_pose(&q, sensors.approach()) else { return };
         let displacement_m = parameters.lvdt.displacement_m(sample.lvdt).ok();
         let follows = |batch: &PoseBatch| {
             let expected = batch.index.wrapping_add(u32::from(batch.stride) * batch.poses.len() as u32);

@@ -6,8 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Chain, Force, Joint, JointKind, JointVector, Link, MAX_JOINTS, Matrix3, Measurement, Number, PARAMETERS_OF_LAST_LINK,
-    PARAMETERS_PER_JOINT, Pairing, Quantity, Real, Row, Vector3,
+    Approach, Chain, Configuration, Force, Joint, JointKind, JointTerms, JointVector, Link, MAX_JOINTS, Matrix3, Measurement,
+    Number, PARAMETERS_OF_LAST_LINK, PARAMETERS_PER_JOINT, Pairing, Quantity, Real, Row, Vector3,
 };
 
 /// A rigid pose: `point_base = rotation · point_tool + translation_m`.
@@ -36,20 +36,22 @@ pub struct Kinematics<S> {
     joints: usize,
     links: [LinkGeometry<S>; MAX_JOINTS + 1],
     encoders: [Joint<S>; MAX_JOINTS],
+    /// None where they add nothing, so that who has none does not pay for them.
+    terms: Option<JointTerms<S>>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct LinkGeometry<S> {
-    translation_m: Vector3<S>,
+pub(crate) struct LinkGeometry<S> {
+    pub(crate) translation_m: Vector3<S>,
     /// `Rz(alpha) · Ry(beta) · Rx(gamma)`.
-    rotation: Matrix3<S>,
+    pub(crate) rotation: Matrix3<S>,
     sin_alpha: S,
     cos_alpha: S,
 }
 
 /// What a joint does at one pose.
 #[derive(Clone, Copy)]
-enum Motion<S> {
+pub(crate) enum Motion<S> {
     Turn { sin: S, cos: S },
     Slide { distance_m: S },
 }
@@ -69,7 +71,21 @@ impl<S: Number> Kinematics<S> {
                 *encoder = joint;
             }
         }
-        Self { joints: chain.joints(), links, encoders }
+        Self { joints: chain.joints(), links, encoders, terms: None }
+    }
+
+    /// The same with what the joints' terms add to their angles. Where no approach is given, none is known.
+    pub fn with_terms(chain: &Chain<S>, terms: &JointTerms<S>) -> Self {
+        let mut kinematics = Self::new(chain);
+        if !terms.are_zero() {
+            kinematics.terms = Some(*terms);
+        }
+        kinematics
+    }
+
+    /// The chain at encoder outputs `q`, approached so: for whoever knows the approach, or asks for more than one thing.
+    pub fn configuration<'a>(&'a self, q: &'a JointVector<S>, approach: Approach) -> Configuration<'a, S> {
+        Configuration::new(self, q, approach)
     }
 
     /// Number of the chain's parameters, 8·J + 6.
@@ -79,7 +95,24 @@ impl<S: Number> Kinematics<S> {
 
     /// Pose of the tool at encoder outputs `q`.
     pub fn base_from_tool(&self, q: &JointVector<S>) -> Pose<S> {
-        let motions = self.motions(q);
+        self.base_from_tool_approached(q, Approach::UNKNOWN)
+    }
+
+    /// Pose of the tool at encoder outputs `q` that were approached so.
+    pub fn base_from_tool_approached(&self, q: &JointVector<S>, approach: Approach) -> Pose<S> {
+        match self.terms {
+            None => self.tool_pose(&self.rigid_motions(q)),
+            Some(_) => self.displaced_tool_pose(q, approach),
+        }
+    }
+
+    /// Not inlined, so that the way without terms stays as short as it can be.
+    #[inline(never)]
+    fn displaced_tool_pose(&self, q: &JointVector<S>, approach: Approach) -> Pose<S> {
+        self.tool_pose(&self.motions_approached(q, approach))
+    }
+
+    pub(crate) fn tool_pose(&self, motions: &[Motion<S>; MAX_JOINTS]) -> Pose<S> {
         let last = &self.links[self.joints];
         // Two columns of the rotation and the origin travel to the base; the third column is their cross product.
         let mut x_axis: Vector3<S> = last.rotation.column(0).into();
@@ -100,8 +133,7 @@ impl<S: Number> Kinematics<S> {
 
     /// Computed length `d = |T(q)·s − c|`, metres.
     pub fn length(&self, q: &JointVector<S>, pairing: &Pairing<S>) -> S {
-        let bar_m = self.point_in_base(q, &pairing.sphere_tool_m) - pairing.chuck_base_m;
-        bar_m.dot(&bar_m).square_root()
+        self.configuration(q, Approach::UNKNOWN).length(pairing)
     }
 
     /// A quantity at a pairing's sphere, metres, and its gradient by the chain's parameters into `row`, in metres per metre, radian or
@@ -109,25 +141,7 @@ impl<S: Number> Kinematics<S> {
     /// else it depends on is in the force that is returned.
     #[inline]
     pub fn gradient(&self, quantity: Quantity, q: &JointVector<S>, pairing: &Pairing<S>, row: &mut Row<S>) -> Force<S> {
-        let motions = self.motions(q);
-        let bar_m = self.sweep_out(&motions, &pairing.sphere_tool_m) - pairing.chuck_base_m;
-        let (value_m, force_base) = match quantity {
-            Quantity::Length => {
-                let length_m = bar_m.dot(&bar_m).square_root();
-                (length_m, bar_m * length_m.inverse())
-            }
-            Quantity::X | Quantity::Y | Quantity::Z => {
-                let axis = quantity as usize;
-                (bar_m[axis], Vector3::ith(axis, S::one()))
-            }
-        };
-        // The force acts at the sphere. Along a bar its line passes through the chuck as well, which is the exact one of the two.
-        let at_m = match quantity {
-            Quantity::Length => pairing.chuck_base_m,
-            Quantity::X | Quantity::Y | Quantity::Z => bar_m + pairing.chuck_base_m,
-        };
-        let force_tool = self.sweep_wrench(q, &motions, force_base, at_m.cross(&force_base), row);
-        Force { value_m, base: force_base, tool: force_tool }
+        self.configuration(q, Approach::UNKNOWN).gradient(quantity, pairing, row)
     }
 
     /// Position in the base frame of a point of the tool, metres, and the gradients of its three coordinates into `rows`.
@@ -142,24 +156,66 @@ impl<S: Number> Kinematics<S> {
 
     /// Residual `f = d_measured − d_computed`, metres, and the gradient of the computed length into `row`: one row of the equations.
     pub fn residual_row(&self, measurement: &Measurement<S>, row: &mut Row<S>) -> (S, Force<S>) {
-        let force = self.gradient(Quantity::Length, &measurement.q, &measurement.pairing, row);
+        let force = self.measured(measurement).gradient(Quantity::Length, &measurement.pairing, row);
         (measurement.length_m - force.value_m, force)
     }
 
     /// Residual `f = d_measured − d_computed`, metres.
     pub fn residual(&self, measurement: &Measurement<S>) -> S {
-        measurement.length_m - self.length(&measurement.q, &measurement.pairing)
+        measurement.length_m - self.measured(measurement).length(&measurement.pairing)
+    }
+
+    /// The chain where a length was measured. What the joints' terms add there is the measurement's to say.
+    fn measured<'a>(&'a self, measurement: &'a Measurement<S>) -> Configuration<'a, S> {
+        Configuration::displaced(self, &measurement.q, &measurement.joint_terms)
+    }
+
+    pub(crate) fn joints(&self) -> usize {
+        self.joints
+    }
+
+    pub(crate) fn joint_kind(&self, i: usize) -> JointKind {
+        self.encoders[i].kind
+    }
+
+    pub(crate) fn links(&self) -> &[LinkGeometry<S>; MAX_JOINTS + 1] {
+        &self.links
     }
 
     fn motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
+        self.motions_approached(q, Approach::UNKNOWN)
+    }
+
+    /// What the joints do at `q`, when they came from these sides. An arm without terms pays for no more than one comparison.
+    pub(crate) fn motions_approached(&self, q: &JointVector<S>, approach: Approach) -> [Motion<S>; MAX_JOINTS] {
+        match &self.terms {
+            None => self.rigid_motions(q),
+            Some(terms) => self.motions_with_terms(terms, q, approach),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn motions_with_terms(&self, terms: &JointTerms<S>, q: &JointVector<S>, approach: Approach) -> [Motion<S>; MAX_JOINTS] {
+        self.displaced_motions(q, &terms.displacements(q, &terms.loads(self, q), approach))
+    }
+
+    /// What the joints do at `θ = offset + scale · q`.
+    pub(crate) fn rigid_motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
+        self.displaced_motions(q, &JointVector::zero())
+    }
+
+    /// What the joints do at `θ = offset + scale · q + displacement`.
+    pub(crate) fn displaced_motions(&self, q: &JointVector<S>, displacements: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
         let mut motions = [Motion::Slide { distance_m: S::zero() }; MAX_JOINTS];
-        for ((motion, encoder), q) in motions.iter_mut().zip(&self.encoders[..self.joints]).zip(&q.0) {
-            *motion = Motion::new(encoder, *q);
+        let joints = self.encoders[..self.joints].iter().zip(&q.0).zip(&displacements.0);
+        for (motion, ((encoder, &q), &displacement)) in motions.iter_mut().zip(joints) {
+            *motion = Motion::new(encoder, q, displacement);
         }
         motions
     }
 
-    fn sweep_out(&self, motions: &[Motion<S>; MAX_JOINTS], point_tool_m: &Vector3<S>) -> Vector3<S> {
+    pub(crate) fn sweep_out(&self, motions: &[Motion<S>; MAX_JOINTS], point_tool_m: &Vector3<S>) -> Vector3<S> {
         let mut point_m = self.links[self.joints].point(*point_tool_m);
         for (link, motion) in self.links[..self.joints].iter().zip(&motions[..self.joints]).rev() {
             point_m = link.point(motion.point(point_m));
@@ -170,7 +226,7 @@ impl<S: Number> Kinematics<S> {
     /// Pushes a wrench from the base down the chain. In each frame on its way the wrench's components are the columns:
     /// a translation's column is the force, a rotation's its moment about that rotation's axis, an offset's the z moment
     /// (revolute) or z force (prismatic), and the scale's is `q` times the offset's. The force as the tool frame has it is returned.
-    fn sweep_wrench(
+    pub(crate) fn sweep_wrench(
         &self,
         q: &JointVector<S>,
         motions: &[Motion<S>; MAX_JOINTS],
@@ -253,9 +309,9 @@ impl<S: Number> LinkGeometry<S> {
 }
 
 impl<S: Number> Motion<S> {
-    /// What a joint does at encoder output `q`.
-    fn new(joint: &Joint<S>, q: S) -> Self {
-        let theta = joint.offset + joint.scale * q;
+    /// What a joint does at encoder output `q`, when its terms add a displacement.
+    fn new(joint: &Joint<S>, q: S, displacement: S) -> Self {
+        let theta = joint.offset + joint.scale * q + displacement;
         match joint.kind {
             JointKind::Revolute => {
                 let (sin, cos) = theta.sine_cosine();
@@ -278,6 +334,22 @@ impl<S: Number> Motion<S> {
         match *self {
             Self::Turn { .. } => self.direction(p),
             Self::Slide { distance_m } => Vector3::new(p.x, p.y, p.z + distance_m),
+        }
+    }
+
+    /// A direction before the joint, seen from behind it.
+    pub(crate) fn direction_behind(&self, v: Vector3<S>) -> Vector3<S> {
+        match *self {
+            Self::Turn { sin, cos } => Self::Turn { sin: -sin, cos }.direction(v),
+            Self::Slide { .. } => v,
+        }
+    }
+
+    /// A first moment of mass (kg m) behind the joint, seen from before it.
+    pub(crate) fn moved_moment(&self, first_kg_m: Vector3<S>, mass_kg: S) -> Vector3<S> {
+        match *self {
+            Self::Turn { .. } => self.direction(first_kg_m),
+            Self::Slide { distance_m } => Vector3::new(first_kg_m.x, first_kg_m.y, first_kg_m.z + distance_m * mass_kg),
         }
     }
 

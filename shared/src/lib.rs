@@ -9,6 +9,7 @@
 //!
 //! Chain ──Kinematics::new──▶ Kinematics, Measurements ──LengthRows::compute──▶ residuals f, rows ∂d/∂p, forces
 //!                                                                                   │ NormalEquations::add
+//! JointTerms ──with_terms──────▲
 //! new values ◀──Problem::moved── Step ◀──DampedSolver::solve(λ)── JᵀWJ, JᵀWf
 //!                            (minimise: from Problem to Minimum)
 //! ```
@@ -19,11 +20,14 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod approach;
 mod chain;
+mod configuration;
 mod crc32;
 mod kinematics;
 mod lengths;
 mod lm;
+mod loads;
 mod measurement;
 mod normal;
 mod parameter;
@@ -31,14 +35,18 @@ mod real;
 mod rows;
 mod sensing;
 mod step;
+mod terms;
 mod trig;
 pub mod wire;
 
+pub use approach::{Approach, Direction};
 pub use chain::{Chain, ChainError, Joint, JointKind, JointVector, Link};
+pub use configuration::Configuration;
 pub use crc32::{crc32, crc32_digest};
 pub use kinematics::{Extent, Kinematics, Pose};
 pub use lengths::{FreeParameters, FreeParametersError, Lengths};
 pub use lm::{ConvergenceTest, LmOptions, Minimum, Problem, Status, lm_memory, minimise};
+pub use loads::{Body, Masses, STANDARD_GRAVITY_M_S2};
 pub use measurement::{Force, Measurement, Pairing, Quantity};
 pub use normal::{MemoryTooShort, NormalEquations, Precision, SizeMismatch};
 pub use parameter::{Parameter, ParameterKind, ParameterUnit, UnknownParameter};
@@ -49,6 +57,7 @@ pub use sensing::{
     LvdtCurve, LvdtFault, LvdtReading, MAX_COUPLINGS, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria,
 };
 pub use step::{DampedSolver, Damping, NotPositiveDefinite, Step};
+pub use terms::{JointTerms, TERMS_PER_JOINT, TermKind, TermsError, term_basis};
 pub use trig::sin_cos_f32;
 
 /// Three-vector of metres or of unit-free direction components.

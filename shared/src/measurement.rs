@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{JointVector, Real, Vector3};
+use crate::{JointVector, Number, Real, Vector3};
 
 /// Where the bar's two ends are: a chuck on the table and a sphere on the tool.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,10 +22,19 @@ pub struct Measurement<S> {
     pub pairing: Pairing<S>,
     /// Encoder outputs, radians or metres.
     pub q: JointVector<S>,
+    /// What the joints' terms add to their angles there, radians or metres ([`crate::JointTerms::displacements`]); zero where there are none.
+    pub joint_terms: JointVector<S>,
     /// Measured length d, metres.
     pub length_m: S,
     /// Weight of the squared residual; 1 when all lengths are equally good.
     pub weight: S,
+}
+
+impl<S: Number> Measurement<S> {
+    /// A length of weight one (metres) between two ends, with the joints at `q` (radians or metres) and no terms.
+    pub fn new(pairing: Pairing<S>, q: JointVector<S>, length_m: S) -> Self {
+        Self { pairing, q, joint_terms: JointVector::zero(), length_m, weight: S::one() }
+    }
 }
 
 /// One number that depends on where the sphere is, seen from the chuck.

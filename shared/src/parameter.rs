@@ -69,6 +69,10 @@ pub enum ParameterUnit {
     One,
     /// A time.
     Second,
+    /// An angle by a moment.
+    RadianPerNewtonMetre,
+    /// A length by a force.
+    MetrePerNewton,
 }
 
 /// One parameter of a chain: a kind, and the number of its link or joint counted from 1. Written `x1`, `gamma7`, `scale6`.

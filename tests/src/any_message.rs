@@ -7,7 +7,8 @@ use ballbar::wire::{
     ToolPose, WhichSet,
 };
 use ballbar::{
-    Counts, Coupling, Encoder, EncoderError, JointKind, LvdtCurve, LvdtReading, Sample, SettledPose, Stillness, StillnessCriteria,
+    Approach, Counts, Coupling, Direction, Encoder, EncoderError, JointKind, LvdtCurve, LvdtReading, Sample, SettledPose,
+    Stillness, StillnessCriteria,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -50,7 +51,7 @@ pub fn command() -> Of<Command> {
         any::<u32>().prop_map(|crc| Command::Commit { crc }),
         Just(Command::Discard),
         Just(Command::CurrentPose),
-        (which(), few(any::<f32>())).prop_map(|(set, q)| Command::ForwardKinematics { set, q }),
+        (which(), few(any::<f32>()), approach()).prop_map(|(set, q, approach)| Command::ForwardKinematics { set, q, approach }),
         Just(Command::Reset),
         Just(Command::ReadPrevious),
     ]
@@ -80,8 +81,9 @@ fn outcome() -> Of<Result<Answer, Refusal>> {
         Just(Refusal::NoSample),
         Just(Refusal::NoPrevious),
     ];
-    let current = (any::<u64>(), any::<u8>(), few(any::<f32>()), pose(), option::of(any::<f32>()))
-        .prop_map(|(t_us, homed, q, pose, displacement_m)| CurrentPose { t_us, homed, q, pose, displacement_m });
+    let current = (any::<u64>(), any::<u8>(), few(any::<f32>()), approach(), pose(), option::of(any::<f32>())).prop_map(
+        |(t_us, homed, q, approach, pose, displacement_m)| CurrentPose { t_us, homed, q, approach, pose, displacement_m },
+    );
     let answers = prop_oneof![
         Just(Answer::Done),
         status().prop_map(Answer::Status),
@@ -229,8 +231,17 @@ fn parameters() -> Of<ParameterSet> {
     let encoder =
         any::<(f32, u32)>().prop_map(|(counts_per_unit, counts_per_index)| Encoder { counts_per_unit, counts_per_index });
     let coupling = any::<(u8, u8, f32)>().prop_map(|(joint, driven_by, ratio)| Coupling { joint, driven_by, ratio });
-    (text(32), any::<bool>(), few(kind), vec(any::<f32>(), 0..=70), few(encoder), few(coupling), curve())
-        .prop_map(|(name, is_calibrated, kinds, parameters, encoders, couplings, lvdt)| ParameterSet {
+    (
+        text(32),
+        any::<bool>(),
+        few(kind),
+        vec(any::<f32>(), 0..=70),
+        few(encoder),
+        few(coupling),
+        curve(),
+        vec(any::<f32>(), 0..=87),
+    )
+        .prop_map(|(name, is_calibrated, kinds, parameters, encoders, couplings, lvdt, terms)| ParameterSet {
             name: name.as_str().try_into().unwrap(),
             is_calibrated,
             kinds,
@@ -238,7 +249,15 @@ fn parameters() -> Of<ParameterSet> {
             encoders,
             couplings,
             lvdt,
+            terms: bounded(terms),
         })
+        .boxed()
+}
+
+fn approach() -> Of<Approach> {
+    let way = prop_oneof![Just(None), Just(Some(Direction::Rising)), Just(Some(Direction::Falling))];
+    vec(way, 8)
+        .prop_map(|ways| ways.into_iter().enumerate().fold(Approach::UNKNOWN, |approach, (i, way)| approach.with(i, way)))
         .boxed()
 }
 

@@ -39,7 +39,7 @@ pub fn write_calibrated(folder: &Path, design: &str) -> Robot {
         rms_mm: 0.1,
         held_out_rms_mm: None,
     };
-    let text = calibrated_toml(&source, &chain, &calibration).expect("a robot's text");
+    let text = calibrated_toml(&source, &chain, &design.terms, &calibration).expect("a robot's text");
     // What JSON quotes TOML quotes alike.
     let name = serde_json::to_string(HOSTILE_NAME).expect("a text");
     let named = |line: &str| if line.starts_with("name =") { format!("name = {name}\n") } else { format!("{line}\n") };

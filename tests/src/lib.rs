@@ -1,6 +1,7 @@
 //! What the tests in `tests/` share.
 
 pub mod any_message;
+pub mod arms;
 pub mod at_length;
 #[cfg(unix)]
 pub mod bridge;

@@ -1,7 +1,7 @@
 //! Sets of parameters of different robots and lengths.
 
-use ballbar::wire::ParameterSet;
-use ballbar::{Coupling, Encoder, JointKind, LvdtCurve};
+use ballbar::wire::{ParameterSet, term_numbers};
+use ballbar::{Body, Coupling, Encoder, JointKind, JointTerms, LvdtCurve, TermKind, Vector3};
 use heapless::Vec;
 use host_cal::files::open_robot;
 
@@ -20,7 +20,21 @@ pub fn puma() -> ParameterSet {
         encoders: PUMA_ENCODERS.map(|(counts_per_unit, counts_per_index)| Encoder { counts_per_unit, counts_per_index }).into(),
         couplings: Vec::from_slice(&[Coupling { joint: 5, driven_by: 4, ratio: 13.0 / 72.0 }]).unwrap(),
         lvdt: curve(),
+        terms: Vec::new(),
     }
+}
+
+/// The same with every kind of term, and masses: of a gear, a disc and a gap of a real arm's size.
+pub fn puma_with_terms() -> ParameterSet {
+    let mut terms = JointTerms::none();
+    for joint in 0..6 {
+        let size = 1e-4 * (joint + 1) as f64;
+        let of_joint = [size, -size / 2.0, size / 3.0, -size / 4.0, 1e-5, 2e-4 - size / 8.0];
+        TermKind::ALL.into_iter().zip(of_joint).for_each(|(term, value)| terms.set_coefficient(joint, term, value));
+        terms.masses.links[joint] = Body { mass_kg: 12.0 / (joint + 1) as f64, center_m: Vector3::new(0.05, -0.1, 0.02) };
+    }
+    terms.masses.payload = Body { mass_kg: 2.5, center_m: Vector3::new(0.0, 0.0, 0.04) };
+    ParameterSet { name: "PUMA 560 of metal".try_into().unwrap(), terms: term_numbers(&terms, 6), ..puma() }
 }
 
 /// Another set of the same robot.
@@ -56,6 +70,15 @@ pub fn largest() -> ParameterSet {
         encoders: core::iter::repeat_n(Encoder { counts_per_unit: -1.5, counts_per_index: u32::MAX }, 8).collect(),
         couplings: core::iter::repeat_n(Coupling { joint: 7, driven_by: 6, ratio: -0.5 }, 8).collect(),
         lvdt: LvdtCurve { code_min: 60_000, code_max: u16::MAX, ..curve() },
+        terms: {
+            let mut terms = JointTerms::none();
+            for joint in 0..8 {
+                terms.set_coefficient(joint, TermKind::Compliance, -1e-5);
+                terms.set_coefficient(joint, TermKind::Backlash, 1e-4);
+            }
+            terms.masses.payload = Body { mass_kg: 2.0, center_m: Vector3::new(0.1, 0.2, -0.3) };
+            term_numbers(&terms, 8)
+        },
     }
 }
 

@@ -75,7 +75,9 @@ fn plausible_deviation(unit: ParameterUnit) -> f64 {
         ParameterUnit::Metre => 5e-3 / 3.0,
         ParameterUnit::Radian => 0.5_f64.to_radians() / 3.0,
         ParameterUnit::One => 0.5e-2 / 3.0,
-        ParameterUnit::Second => unreachable!("no parameter of a chain is a time"),
+        ParameterUnit::Second | ParameterUnit::RadianPerNewtonMetre | ParameterUnit::MetrePerNewton => {
+            unreachable!("no parameter of a chain is in {unit:?}")
+        }
     }
 }
 
@@ -104,7 +106,8 @@ pub fn fitted(design: &Robot, rig: &Rig, seed: u64) -> Robot {
         let length_m = truth.length(&q, &pairing) + noise.sample(&mut rng);
         PoseRow {
             pairing: id,
-            measurement: Measurement { pairing, q, length_m, weight: 1.0 },
+            measurement: Measurement::new(pairing, q, length_m),
+            approach: ballbar::Approach::UNKNOWN,
             sigma_m: None,
             set: None,
             t_s: None,

@@ -79,6 +79,9 @@ impl Remedy for UnknownError {
             Self::NoRods => (Kind::BarGain, "neither rig nor poses say how long the bar is at mid travel"),
             Self::NoMotion => (Kind::Latency, "no length was measured in motion"),
             Self::NoSets => (Kind::Sets, "no pose names a set"),
+            Self::NoMasses => (Kind::Compliance, "the robot's file has no `mass_kg` that a joint bears"),
+            Self::NoDiscs => (Kind::Eccentricity, "all joints are prismatic"),
+            Self::NoApproach => (Kind::Backlash, "no joint is known to have come to its poses from both sides"),
             _ => return None,
         };
         Some(format!("--unknown {}: {why}", kind.name()))
@@ -92,6 +95,9 @@ impl Remedy for UnknownError {
             Self::NoRods => "Give the rig a [bar] with `lengths_mm`, or the poses a column `bar_mm`.",
             Self::NoMotion => "Only poses that `host-cal collect` measures on the way tell it.",
             Self::NoSets => "Give the poses a column `set`.",
+            Self::NoMasses => "Give links their `mass_kg` and `center_mm` in robot.toml, and the payload where there is one.",
+            Self::NoDiscs => "A slide's encoder has no disc: leave `eccentricity` out.",
+            Self::NoApproach => "Give the poses a column `approach`: + or - for each joint, 0 where it is not known.",
             _ => return None,
         };
         Some(words.into())

@@ -29,24 +29,30 @@ pub enum ScreenUnit {
     One,
     /// Milliseconds, for seconds.
     Millisecond,
+    /// Degrees per newton metre, for radians.
+    DegreePerNewtonMetre,
+    /// Millimetres per newton, for metres.
+    MillimetrePerNewton,
 }
 
 impl ScreenUnit {
-    /// Its short name: `mm`, `deg`, `1`, `ms`.
+    /// Its short name: `mm`, `deg`, `1`, `ms`, `deg/Nm`, `mm/N`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Millimetre => "mm",
             Self::Degree => "deg",
             Self::One => "1",
             Self::Millisecond => "ms",
+            Self::DegreePerNewtonMetre => "deg/Nm",
+            Self::MillimetrePerNewton => "mm/N",
         }
     }
 
     /// From SI to the screen.
     pub fn from_si(self, value: f64) -> f64 {
         match self {
-            Self::Millimetre => mm_from_m(value),
-            Self::Degree => value.to_degrees(),
+            Self::Millimetre | Self::MillimetrePerNewton => mm_from_m(value),
+            Self::Degree | Self::DegreePerNewtonMetre => value.to_degrees(),
             Self::One => value,
             Self::Millisecond => value * 1e3,
         }
@@ -55,8 +61,8 @@ impl ScreenUnit {
     /// From the screen to SI.
     pub fn to_si(self, value: f64) -> f64 {
         match self {
-            Self::Millimetre => m_from_mm(value),
-            Self::Degree => value.to_radians(),
+            Self::Millimetre | Self::MillimetrePerNewton => m_from_mm(value),
+            Self::Degree | Self::DegreePerNewtonMetre => value.to_radians(),
             Self::One => value,
             Self::Millisecond => value / 1e3,
         }
@@ -70,6 +76,8 @@ impl From<ParameterUnit> for ScreenUnit {
             ParameterUnit::Radian => Self::Degree,
             ParameterUnit::One => Self::One,
             ParameterUnit::Second => Self::Millisecond,
+            ParameterUnit::RadianPerNewtonMetre => Self::DegreePerNewtonMetre,
+            ParameterUnit::MetrePerNewton => Self::MillimetrePerNewton,
         }
     }
 }

@@ -10,11 +10,11 @@ use super::parameter_set::{ParameterSet, ParameterSetError, SetIdentity};
 use super::status::{SelfTest, Status};
 use super::stream_selection::StreamSelection;
 use super::tool_pose::ToolPose;
-use crate::{LvdtCurve, MAX_JOINTS, SettledPose, StillnessCriteria};
+use crate::{Approach, LvdtCurve, MAX_JOINTS, SettledPose, StillnessCriteria};
 
 /// The protocol that this crate speaks.
 pub const PROTOCOL: ProtocolVersion = ProtocolVersion {
-    number: 2,
+    number: 3,
     schema: {
         let (to_board, to_host) =
             (Key::for_path::<ToBoard>("to-board").to_bytes(), Key::for_path::<ToHost>("to-host").to_bytes());
@@ -49,7 +49,6 @@ pub enum ToBoard {
 
 /// From board to host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
-#[expect(clippy::large_enum_variant, reason = "there is no heap to box on, and one message at a time")]
 pub enum ToHost {
     /// The answer to a hello.
     Hello(BoardHello),
@@ -173,6 +172,8 @@ pub enum Command {
         set: WhichSet,
         /// Encoder outputs, radians or metres.
         q: Vec<f32, MAX_JOINTS>,
+        /// From which sides the joints came there.
+        approach: Approach,
     },
     /// Resets the board, after the answer has left.
     Reset,
@@ -200,6 +201,7 @@ pub struct Reply {
 
 /// What a command brings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[expect(clippy::large_enum_variant, reason = "there is no heap to box on, and one message at a time")]
 pub enum Answer {
     /// It is done.
     Done,
@@ -311,6 +313,8 @@ pub struct CurrentPose {
     pub homed: u8,
     /// Encoder outputs, radians or metres.
     pub q: Vec<f32, MAX_JOINTS>,
+    /// From which sides they were reached, as far as the board saw it.
+    pub approach: Approach,
     /// Where the tool is.
     pub pose: ToolPose,
     /// Displacement of the bar from mid travel, metres; none when the LVDT is at fault.

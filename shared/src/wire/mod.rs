@@ -13,6 +13,7 @@ mod messages;
 mod parameter_set;
 mod status;
 mod stream_selection;
+mod term_numbers;
 mod tool_pose;
 
 pub use batch::{MAX_BATCH, MAX_POSE_BATCH, PoseBatch, SampleBatch, SampleStep, StreamedPose};
@@ -24,4 +25,5 @@ pub use messages::{
 pub use parameter_set::{CompiledParameters, MAX_REACH_M, MAX_SPAN_M, ParameterSet, ParameterSetError, SetIdentity};
 pub use status::{Check, CheckResult, EncoderStatus, LinkCounts, SelfTest, SlotState, Status};
 pub use stream_selection::StreamSelection;
+pub use term_numbers::{MAX_TERM_NUMBERS, term_numbers};
 pub use tool_pose::ToolPose;

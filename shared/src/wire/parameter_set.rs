@@ -8,10 +8,11 @@ use heapless::{String, Vec};
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use super::term_numbers::{MAX_TERM_NUMBERS, terms_of};
 use super::tool_pose::ToolPose;
 use crate::{
-    Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, JointVector, Kinematics, LvdtCurve, MAX_COUPLINGS,
-    MAX_JOINTS, MAX_PARAMETERS, Parameter, ParameterKind, ParameterUnit,
+    Approach, Chain, Coupling, Encoder, EncoderError, JointEncoders, JointKind, JointTerms, JointVector, Kinematics, LvdtCurve,
+    MAX_COUPLINGS, MAX_JOINTS, MAX_PARAMETERS, Parameter, ParameterKind, ParameterUnit, TermKind,
 };
 
 /// The farthest from the base that a tool may come, metres. At 100 m an f32 is 8 µm from the next, a tenth of what a ball-bar
@@ -48,6 +49,9 @@ pub struct ParameterSet {
     pub couplings: Vec<Coupling<f32>, MAX_COUPLINGS>,
     /// The LVDT's curve.
     pub lvdt: LvdtCurve,
+    /// Terms of the joints: 10·J + 7 numbers as [`term_numbers`](super::term_numbers()) gives them, or none. Last, so that a set
+    /// in the flash of a firmware that knew none is one of this layout but for its end.
+    pub terms: Vec<f32, MAX_TERM_NUMBERS>,
 }
 
 /// What a set is known by.
@@ -72,6 +76,8 @@ pub struct CompiledParameters {
     pub joints: usize,
     /// The chain.
     pub kinematics: Kinematics<f32>,
+    /// Half of each joint's gap, radians or metres.
+    pub backlash: [f32; MAX_JOINTS],
     /// Counts to joint values.
     pub encoders: JointEncoders<f32>,
     /// Codes to displacements.
@@ -107,6 +113,8 @@ pub enum ParameterSetError {
         /// Position in parameter order, from 0, of the largest length.
         longest: u8,
     },
+    /// Terms, masses or gravity that no robot has: see [`JointTerms::check`].
+    Terms,
 }
 
 impl fmt::Display for ParameterSetError {
@@ -116,6 +124,7 @@ impl fmt::Display for ParameterSetError {
             Self::Sizes => f.write_str("numbers of joints, parameters and encoders do not fit together"),
             Self::NotFinite { index } => write!(f, "{} is not a finite number", parameter(index)),
             Self::Encoders(error) => error.fmt(f),
+            Self::Terms => f.write_str("terms of joints, masses or gravity are out of range, or not of such joints"),
             Self::Lvdt => f.write_str(LvdtCurve::VALID),
             Self::Implausible { index } => {
                 write!(f, "{} is out of range: an angle is 100 rad at most, a scale 0.001 to 1000 in size", parameter(index))
@@ -149,6 +158,16 @@ impl ParameterSet {
         Chain::new(&self.kinds, &self.parameters).map_err(|_| ParameterSetError::Sizes)
     }
 
+    /// The joints' terms; those of a set that has none add nothing.
+    ///
+    /// # Errors
+    /// [`ParameterSetError`] for terms that are not those of the joints.
+    pub fn joint_terms(&self) -> Result<JointTerms<f32>, ParameterSetError> {
+        let terms = terms_of(&self.terms, self.kinds.len()).ok_or(ParameterSetError::Sizes)?;
+        terms.check(&self.kinds).map_err(|_| ParameterSetError::Terms)?;
+        Ok(terms)
+    }
+
     /// The encoder outputs over which poses are looked at where nobody knows the joint limits, as on the board: a whole turn of
     /// revolute joints and a metre either way of prismatic ones.
     pub fn usual_ranges(&self) -> Vec<RangeInclusive<f32>, MAX_JOINTS> {
@@ -180,16 +199,18 @@ impl ParameterSet {
         if !self.lvdt.is_valid() {
             return Err(ParameterSetError::Lvdt);
         }
-        let kinematics = Kinematics::new(&chain);
+        let terms = self.joint_terms()?;
+        let kinematics = Kinematics::with_terms(&chain, &terms);
         judge(&chain, &kinematics, ranges)?;
-        Ok(CompiledParameters { joints: chain.joints(), kinematics, encoders, lvdt: self.lvdt })
+        let backlash = core::array::from_fn(|joint| terms.coefficient(joint, TermKind::Backlash));
+        Ok(CompiledParameters { joints: chain.joints(), kinematics, backlash, encoders, lvdt: self.lvdt })
     }
 }
 
 impl CompiledParameters {
-    /// Pose of the tool at encoder outputs `q`; none where it is no finite number.
-    pub fn tool_pose(&self, q: &JointVector<f32>) -> Option<ToolPose> {
-        let pose = ToolPose::from(&self.kinematics.base_from_tool(q));
+    /// Pose of the tool at encoder outputs `q` that were approached so; none where it is no finite number.
+    pub fn tool_pose(&self, q: &JointVector<f32>, approach: Approach) -> Option<ToolPose> {
+        let pose = ToolPose::from(&self.kinematics.base_from_tool_approached(q, approach));
         let numbers = pose.position_m.iter().chain(&pose.x_axis).chain(&pose.y_axis);
         numbers.copied().all(f32::is_finite).then_some(pose)
     }

@@ -3,7 +3,7 @@
 use ballbar::wire::{
     Answer, Check, Command, ParameterSet, ParameterSetError, Refusal, SlotState, StreamSelection, ToolPose, WhichSet,
 };
-use ballbar::{Coupling, Encoder, EncoderError, Kinematics, LvdtCurve, LvdtReading, Stillness, StillnessCriteria};
+use ballbar::{Approach, Coupling, Encoder, EncoderError, Kinematics, LvdtCurve, LvdtReading, Stillness, StillnessCriteria};
 use ballbar_firmware::Slots;
 use ballbar_tests::fake_board::FakeBoard;
 use ballbar_tests::fake_hardware::empty_memory;
@@ -327,7 +327,7 @@ fn forward_kinematics_is_that_of_the_set_asked_for() {
     let mut board = puma_board();
     let q = [0.3_f32, -1.1, 2.0, 0.4, -0.9, 1.7];
     let wide = q.map(f64::from);
-    let ask = |set, q: &[f32]| Command::ForwardKinematics { set, q: q.iter().copied().collect() };
+    let ask = |set, q: &[f32]| Command::ForwardKinematics { set, q: q.iter().copied().collect(), approach: Approach::UNKNOWN };
     assert_eq!(board.ask(ask(WhichSet::Staged, &q)), Err(Refusal::NoParameters));
     board.ask(Command::WriteParameters(calibrated_puma())).unwrap();
     for (which, set) in [(WhichSet::Active, puma()), (WhichSet::Staged, calibrated_puma())] {
@@ -350,6 +350,7 @@ fn slides() -> ParameterSet {
         parameters: set.parameters[..54].iter().copied().collect(),
         encoders: core::iter::repeat_n(Encoder { counts_per_unit: 1.0, counts_per_index: 0 }, 6).collect(),
         couplings: (1..6).map(|joint| Coupling { joint, driven_by: joint - 1, ratio: 1e4 }).collect(),
+        terms: heapless::Vec::new(),
         ..set
     }
 }
@@ -358,7 +359,7 @@ fn slides() -> ParameterSet {
 fn a_pose_that_is_no_number_is_refused() {
     let mut board = FakeBoard::new().settle_in();
     board.commit(&slides()).unwrap();
-    let ask = |q: f32| Command::ForwardKinematics { set: WhichSet::Active, q: [q; 6].into() };
+    let ask = |q: f32| Command::ForwardKinematics { set: WhichSet::Active, q: [q; 6].into(), approach: Approach::UNKNOWN };
     assert!(matches!(board.ask(ask(1e6)), Ok(Answer::Pose(_))));
     assert_eq!(board.ask(ask(f32::MAX)), Err(Refusal::NotFinite));
 }

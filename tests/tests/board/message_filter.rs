@@ -4,7 +4,7 @@ use ballbar::wire::{
     Answer, BoardHello, Command, CurrentPose, EncoderStatus, Event, PROTOCOL, ParameterSet, PoseBatch, Reply, ResetReason,
     SampleBatch, SelfTest, Status, Stream, StreamedPose, ToHost, ToolPose,
 };
-use ballbar::{Counts, LvdtReading, Sample, SettledPose};
+use ballbar::{Approach, Counts, LvdtReading, Sample, SettledPose};
 use ballbar_tests::fake_board::FakeBoard;
 use ballbar_tests::parameter_sets::puma;
 use host_cal::board::{Implausible, MessageFilter, RefusedMessages, StreamLosses};
@@ -385,6 +385,7 @@ fn hellos_and_answers_that_cannot_be_true_are_refused() {
         t_us: 5_000_000,
         homed: 0x3f,
         q: [0.25; 6].into_iter().collect(),
+        approach: Approach::UNKNOWN,
         pose: tool_pose(),
         displacement_m: Some(0.01),
     };

@@ -14,7 +14,7 @@ const CLOSES: &str = "<!-- /schema -->";
 #[test]
 fn a_change_of_the_messages_shows_as_a_change_of_number_and_hash() {
     let hash: String = PROTOCOL.schema.iter().map(|byte| format!("{byte:02x}")).collect();
-    insta::assert_snapshot!(format!("protocol {}, schema {hash}", PROTOCOL.number), @"protocol 2, schema 6e34ca1c92f3453f");
+    insta::assert_snapshot!(format!("protocol {}, schema {hash}", PROTOCOL.number), @"protocol 3, schema 020df7739d814a54");
 }
 
 /// `UPDATE_DOCS=1 cargo test -p ballbar-tests --test board wire_document` writes the block anew.

@@ -85,7 +85,7 @@ fn the_longest_settled_pose_fits_into_a_frame() {
 fn the_longest_parameters_fit_into_a_frame_in_both_directions() {
     let set = parameter_sets::largest();
     let up = ToBoard::Request(Request { id: u16::MAX, command: Command::WriteParameters(set.clone()) });
-    insta::assert_snapshot!(payload_bytes(&up), @"481");
+    insta::assert_snapshot!(payload_bytes(&up), @"830");
     payload_bytes(&reply(Answer::Parameters(set)));
 }
 

@@ -126,7 +126,7 @@ fn a_mutant_of_a_robot_is_refused_or_has_sound_numbers_that_survive_a_rewrite() 
         assert!(robot.chain.parameters().iter().all(|value| value.is_finite()));
         assert_eq!((robot.limits.len(), robot.encoders.len()), (robot.chain.joints(), robot.chain.joints()));
         assert!(robot.limits.iter().all(|limits| limits.min < limits.max));
-        let text = calibrated_toml(source, &robot.chain, &calibration).expect("a file that was read can be edited");
+        let text = calibrated_toml(source, &robot.chain, &robot.terms, &calibration).expect("a file that was read can be edited");
         let again = parse_robot(&Source::new("rewritten", &text)).unwrap_or_else(|error| panic!("{error}\n{text}"));
         for (before, after) in robot.chain.parameters().iter().zip(again.chain.parameters()) {
             assert!((before - after).abs() <= 1e-12 * before.abs(), "{before} became {after}\n{text}");

@@ -5,3 +5,4 @@ mod hostile_files;
 mod hostile_names;
 mod odd_files;
 mod protected_files;
+mod robot_terms;

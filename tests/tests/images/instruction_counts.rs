@@ -51,7 +51,7 @@ fn inputs() -> Vec<u8> {
         .map(|pairing| {
             let q: Vec<f64> = robot.limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
             let (pairing, q) = (rig.pairing(pairing), robot.chain.joint_vector(&q).unwrap());
-            Measurement { pairing, q, length_m: 0.46, weight: 1.0 }
+            Measurement::new(pairing, q, 0.46)
         })
         .collect();
     loaded(&robot.chain, &poses)

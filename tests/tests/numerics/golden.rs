@@ -132,14 +132,12 @@ impl FitProblem {
     fn load() -> Self {
         let file: FitFile = golden("fit.json");
         let chain = Chain::new(&kinds(&file.robot.joints), &file.robot.initial).unwrap();
-        let measurement = |pose: &FitPose| Measurement {
-            pairing: Pairing {
-                chuck_base_m: file.chucks_m[pose.chuck].into(),
-                sphere_tool_m: file.spheres_m[pose.sphere].into(),
-            },
-            q: chain.joint_vector(&pose.q).unwrap(),
-            length_m: pose.length_m,
-            weight: 1.0,
+        let measurement = |pose: &FitPose| {
+            Measurement::new(
+                Pairing { chuck_base_m: file.chucks_m[pose.chuck].into(), sphere_tool_m: file.spheres_m[pose.sphere].into() },
+                chain.joint_vector(&pose.q).unwrap(),
+                pose.length_m,
+            )
         };
         let measurements = file.poses.iter().map(measurement).collect();
         let free = FreeParameters::from_indices(file.robot.free.iter().copied()).unwrap();

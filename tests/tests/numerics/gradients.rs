@@ -1,9 +1,8 @@
 //! The sweeps of vectors against 4×4 products of complex numbers, over random chains: the pose, and derivatives that complex
 //! steps make exact to rounding.
 
-use std::f64::consts::PI;
-
-use ballbar::{Chain, JointKind, JointVector, Kinematics, MAX_PARAMETERS, Matrix3, Measurement, Pairing, Quantity, Vector3};
+use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Matrix3, Measurement, Pairing, Quantity, Vector3};
+use ballbar_tests::arms::{Arm, arms, config, pairings, points};
 use ballbar_tests::naive;
 use nalgebra::Vector4;
 use num_complex::Complex;
@@ -14,55 +13,6 @@ const TOLERANCE: f64 = 1e-12;
 
 /// What no column can be, so that it shows which entries were written.
 const UNTOUCHED: f64 = -12_345.0;
-
-/// A chain and a joint vector, as proptest shows them.
-#[derive(Clone, Debug)]
-struct Arm {
-    chain: Chain<f64>,
-    q: Vec<f64>,
-}
-
-impl Arm {
-    fn q(&self) -> JointVector<f64> {
-        self.chain.joint_vector(&self.q).unwrap()
-    }
-}
-
-/// 1 to 8 joints of either kind, nothing aligned: metres ±1, radians ±π, scales ±(0.5 … 1.5).
-fn arms() -> impl Strategy<Value = Arm> {
-    let joint = prop_oneof![
-        (Just(JointKind::Revolute), scales(), -PI..PI, -PI..PI),
-        (Just(JointKind::Prismatic), scales(), -1.0..1.0, -1.0..1.0),
-    ];
-    let link = (prop::array::uniform3(-1.0..1.0), prop::array::uniform3(-PI..PI));
-    (prop::collection::vec((link.clone(), joint), 1..=8), link).prop_map(|(pairs, last)| {
-        let (mut kinds, mut parameters, mut q) = (Vec::new(), Vec::new(), Vec::new());
-        for ((translation, rotation), (kind, scale, offset, value)) in pairs {
-            kinds.push(kind);
-            parameters.extend(translation.into_iter().chain(rotation).chain([offset, scale]));
-            q.push(value);
-        }
-        parameters.extend(last.0.into_iter().chain(last.1));
-        Arm { chain: Chain::new(&kinds, &parameters).unwrap(), q }
-    })
-}
-
-fn scales() -> impl Strategy<Value = f64> {
-    prop_oneof![0.5..1.5, -1.5..-0.5]
-}
-
-fn points(reach_m: f64) -> impl Strategy<Value = Vector3<f64>> {
-    prop::array::uniform3(-reach_m..reach_m).prop_map(Vector3::from)
-}
-
-fn pairings() -> impl Strategy<Value = Pairing<f64>> {
-    (points(1.0), points(0.3)).prop_map(|(chuck_base_m, sphere_tool_m)| Pairing { chuck_base_m, sphere_tool_m })
-}
-
-fn config() -> ProptestConfig {
-    // A failure prints the case; a file of seeds beside the test would only be one more thing to keep.
-    ProptestConfig { failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn complex(values: &[f64]) -> Vec<Complex<f64>> {
     values.iter().map(|&value| value.into()).collect()
@@ -142,7 +92,7 @@ proptest! {
     #[test]
     fn a_residual_is_measured_less_computed(arm in arms(), pairing in pairings(), length_m in 0.0..5.0) {
         let kinematics = Kinematics::new(&arm.chain);
-        let measurement = Measurement { pairing, q: arm.q(), length_m, weight: 1.0 };
+        let measurement = Measurement::new(pairing, arm.q(), length_m);
         let mut row = [UNTOUCHED; MAX_PARAMETERS];
         let (residual_m, _) = kinematics.residual_row(&measurement, &mut row);
         prop_assert_eq!(residual_m, length_m - kinematics.length(&arm.q(), &pairing));
@@ -171,7 +121,7 @@ proptest! {
         let lengths: Vec<f64> = ends.iter().map(|(pairing, _)| kinematics.length(&arm.q(), pairing)).collect();
         prop_assume!(lengths.iter().all(|&length_m| length_m > 0.2));
         let measurements: Vec<_> = ends.iter().zip(&lengths)
-            .map(|(&(pairing, off_m), length_m)| Measurement { pairing, q: arm.q(), length_m: length_m + off_m, weight: 1.0 })
+            .map(|(&(pairing, off_m), length_m)| Measurement::new(pairing, arm.q(), length_m + off_m))
             .collect();
 
         let (before, mut step, size) = cost_and_descent(&arm.chain, &measurements);

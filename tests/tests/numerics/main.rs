@@ -8,6 +8,7 @@ mod fits_in_other_frames;
 mod golden;
 mod gradients;
 mod identification;
+mod joint_terms;
 mod normal_equations;
 mod precision;
 mod ranks;

@@ -159,9 +159,9 @@ fn minimum_of<P: Problem<f32>>(problem: &P, start: P::Values) -> P::Values {
 }
 
 fn in_f32(measurement: &Measurement<f64>) -> Measurement<f32> {
-    let Measurement { pairing: Pairing { chuck_base_m, sphere_tool_m }, q, length_m, weight } = measurement;
+    let Measurement { pairing: Pairing { chuck_base_m, sphere_tool_m }, q, length_m, .. } = measurement;
     let pairing = Pairing { chuck_base_m: chuck_base_m.cast(), sphere_tool_m: sphere_tool_m.cast() };
-    Measurement { pairing, q: q.cast(), length_m: *length_m as f32, weight: *weight as f32 }
+    Measurement::new(pairing, q.cast(), *length_m as f32)
 }
 
 /// The same minimum, seen by what it predicts: each of the 810 lengths beside the one that the `f64` optimum gives.

@@ -33,11 +33,9 @@ fn chain() -> impl Strategy<Value = Chain<f64>> {
 
 fn measurements(chain: &Chain<f64>, chucks: &[Vector3<f64>], spheres: &[Vector3<f64>], q: &[[f64; 8]]) -> Vec<Measurement<f64>> {
     let rows = q.iter().enumerate();
-    rows.map(|(i, q)| Measurement {
-        pairing: Pairing { chuck_base_m: chucks[i % chucks.len()], sphere_tool_m: spheres[i / 3 % spheres.len()] },
-        q: chain.joint_vector(&q[..chain.joints()]).unwrap(),
-        length_m: 1.0,
-        weight: 1.0,
+    rows.map(|(i, q)| {
+        let pairing = Pairing { chuck_base_m: chucks[i % chucks.len()], sphere_tool_m: spheres[i / 3 % spheres.len()] };
+        Measurement::new(pairing, chain.joint_vector(&q[..chain.joints()]).unwrap(), 1.0)
     })
     .collect()
 }

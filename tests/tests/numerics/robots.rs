@@ -150,7 +150,7 @@ fn random_measurements(robot: &Robot, seed: u64) -> Vec<Measurement<f64>> {
     let measurement = |pairing: Pairing<f64>| {
         let q: Vec<f64> = robot.limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
         let q = robot.chain.joint_vector(&q).unwrap();
-        Measurement { pairing, q, length_m: kinematics.length(&q, &pairing), weight: 1.0 }
+        Measurement::new(pairing, q, kinematics.length(&q, &pairing))
     };
     pairings.flat_map(|pairing| [pairing; POSES]).map(measurement).collect()
 }

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use ballbar::{JointVector, Kinematics};
+use ballbar::{Body, Direction, JointKind, JointVector, Kinematics, TermKind, Vector3};
 use ballbar_calib::designs;
 use ballbar_calib::identify::{FitOptions, fit};
-use ballbar_calib::model::{Bar, Dataset, Motion, NamedPoint, PairingId, PoseRow, Rig};
+use ballbar_calib::model::{Bar, Dataset, Motion, NamedPoint, PairingId, PoseRow, Rig, Robot};
 use ballbar_calib::simulate::tool_error;
 use ballbar_calib::unknowns::{Kind, UnknownError, Unknowns};
 use ballbar_tests::at_length::at_length;
@@ -20,10 +20,17 @@ use serde_json::Value;
 
 const ROBOTS: [&str; 5] = ["puma560", "irb120", "ur5e", "stanford", "scara"];
 
-/// A rig of three chucks and three spheres, none in line, of which all but the first chuck have a tolerance; and rows of every kind.
-fn experiment(robot: &str, seed: u64) -> (Rig, Dataset, Vec<f64>) {
-    let robot = open_robot(robot).unwrap();
+/// A robot whose joints have terms and whose links weigh something; a rig of three chucks and three spheres, none in line, of which all but
+/// the first chuck have a tolerance; and rows of every kind.
+fn experiment(robot: &str, seed: u64) -> (Robot, Rig, Dataset) {
+    let mut robot = open_robot(robot).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for joint in 0..robot.chain.joints() {
+        let center_m = Vector3::from_fn(|_, _| rng.random_range(-0.3..0.3));
+        robot.terms.masses.links[joint] = Body { mass_kg: rng.random_range(0.5..20.0), center_m };
+        robot.terms.set_coefficient(joint, TermKind::Compliance, 1e-5);
+        robot.terms.set_coefficient(joint, TermKind::Backlash, 1e-4);
+    }
     let mut ends = |names: [&str; 3], reach_m: f64| {
         names.map(|name| {
             let at = std::array::from_fn(|_| rng.random_range(-reach_m..reach_m));
@@ -45,18 +52,21 @@ fn experiment(robot: &str, seed: u64) -> (Rig, Dataset, Vec<f64>) {
         let mut row = PoseRow::new(&rig, pairing, q, length_m).unwrap();
         row.bar_m = (i % 4 < 2).then_some(rod_m);
         row.set = [None, Some("morning"), Some("evening")][i % 3].map(str::to_owned);
+        for joint in 0..robot.chain.joints() {
+            let direction = [Some(Direction::Rising), Some(Direction::Falling), None][(i + joint) % 3];
+            row.approach = row.approach.with(joint, direction);
+        }
         row.motion = i.is_multiple_of(2).then(|| Motion { rate_m_s: rng.random_range(-0.02..0.02), removed_lag_s: 2e-3 });
         row
     };
     let rows = (0..21).map(&mut row).collect();
     let dataset = Dataset::new("drawn", rows).unwrap();
-    let values = robot.chain.parameters().to_vec();
-    (rig, dataset, values)
+    (robot, rig, dataset)
 }
 
-fn all_unknowns(robot: &str, rig: &Rig, dataset: &Dataset) -> Unknowns {
-    let blocks = Kind::ALL.map(|kind| kind.block(rig, dataset).unwrap());
-    Unknowns::new(&open_robot(robot).unwrap().chain, blocks.into())
+fn all_unknowns(robot: &Robot, rig: &Rig, dataset: &Dataset) -> Unknowns {
+    let blocks = Kind::ALL.map(|kind| kind.block(robot, rig, dataset).unwrap());
+    Unknowns::new(&robot.chain, &robot.terms, blocks.into())
 }
 
 proptest! {
@@ -65,11 +75,13 @@ proptest! {
     /// `−∂residual/∂unknown` by central differences, extrapolated (L. F. Richardson, 1911): exact to some 1e-11 of a metre per unit.
     #[test]
     fn columns_are_what_differences_give(robot in prop::sample::select(&ROBOTS[..]), seed in any::<u64>()) {
-        let (rig, dataset, mut values) = experiment(robot, seed);
-        let unknowns = all_unknowns(robot, &rig, &dataset);
-        let of_chain = values.len();
-        // Of a rig: two chucks and three spheres; two rods; two sets.
-        prop_assert_eq!(unknowns.list().len(), of_chain + 1 + 2 + 1 + 1 + 15 + 2);
+        let (robot, rig, dataset) = experiment(robot, seed);
+        let unknowns = all_unknowns(&robot, &rig, &dataset);
+        let mut values = robot.chain.parameters().to_vec();
+        let (of_chain, joints) = (values.len(), robot.chain.joints());
+        let discs = robot.chain.joint_kinds().iter().filter(|kind| **kind == JointKind::Revolute).count();
+        // Of a rig: two chucks and three spheres; two rods; two sets; of each joint a compliance and a backlash, of each disc four.
+        prop_assert_eq!(unknowns.list().len(), of_chain + 1 + 2 + 1 + 1 + 15 + 2 + 2 * joints + 4 * discs);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         values.iter_mut().for_each(|value| *value += rng.random_range(-0.01..0.01));
         values.extend((of_chain..unknowns.list().len()).map(|_| rng.random_range(-0.003..0.003)));
@@ -112,15 +124,17 @@ fn each_kind_asks_for_what_it_is_made_of() {
     let puma = Puma::default();
     let mut plain = puma.shells(0.46, 4, 0.0, 1);
     plain.rows.iter_mut().for_each(|row| row.set = None);
-    let refused = |kind: Kind, rig: &Rig| kind.block(rig, &plain).err();
+    let refused = |kind: Kind, rig: &Rig| kind.block(&puma.design, rig, &plain).err();
     assert_eq!(refused(Kind::Rig, &puma.rig), Some(UnknownError::NoTolerance));
     assert_eq!(refused(Kind::Latency, &puma.rig), Some(UnknownError::NoMotion));
     assert_eq!(refused(Kind::Sets, &puma.rig), Some(UnknownError::NoSets));
+    assert_eq!(refused(Kind::Compliance, &puma.rig), Some(UnknownError::NoMasses));
+    assert_eq!(refused(Kind::Backlash, &puma.rig), Some(UnknownError::NoApproach));
     assert_eq!(refused(Kind::BarZero, &puma.rig), None);
     let mut without_bar = plain.clone();
     without_bar.rows.iter_mut().for_each(|row| row.bar_m = None);
     let rig = Rig { bar: None, ..puma.rig.clone() };
-    assert_eq!(Kind::BarGain.block(&rig, &without_bar).err(), Some(UnknownError::NoRods));
+    assert_eq!(Kind::BarGain.block(&puma.design, &rig, &without_bar).err(), Some(UnknownError::NoRods));
     for kind in Kind::ALL {
         assert_eq!(Kind::named(kind.name()), Some(kind));
     }
@@ -137,7 +151,7 @@ fn a_zero_that_is_off_is_found_within_its_deviation() {
         let clean = puma.shells(0.46, 30, 0.084e-3, 100 + seed);
         let mut off = clean.clone();
         off.rows.iter_mut().for_each(|row| row.measurement.length_m += OFF_M);
-        let unknowns = vec![Kind::BarZero.block(&puma.rig, &off).unwrap()];
+        let unknowns = vec![Kind::BarZero.block(&puma.design, &puma.rig, &off).unwrap()];
         let found = fit(&puma.design, &off, &FitOptions { unknowns, ..FitOptions::default() }).unwrap();
         let zero = found.parameters.last().unwrap();
         squares += ((zero.fitted - OFF_M) / zero.std.unwrap()).powi(2);
@@ -169,7 +183,7 @@ fn chucks_that_are_off_are_found_but_for_where_they_stand_together() {
         ..PoseRow::new(&believed, row.pairing, row.measurement.q, row.measurement.length_m).unwrap()
     });
     let dataset = Dataset::new("moved", rows.collect()).unwrap();
-    let unknowns = vec![Kind::Rig.block(&believed, &dataset).unwrap()];
+    let unknowns = vec![Kind::Rig.block(&puma.design, &believed, &dataset).unwrap()];
     let found = fit(&puma.design, &dataset, &FitOptions { unknowns, ..FitOptions::default() }).unwrap();
     let as_believed = fit(&puma.design, &dataset, &FitOptions::default()).unwrap();
     assert!(

@@ -49,7 +49,7 @@ impl MeasuredPose {
         let mut q = JointVector::zero();
         q.as_array_mut()[..self.q_rad.len()].copy_from_slice(&self.q_rad);
         let (chuck_base_m, sphere_tool_m) = (Vector3::from(self.chuck_base_m), Vector3::from(self.sphere_tool_m));
-        Measurement { pairing: Pairing { chuck_base_m, sphere_tool_m }, q, length_m: self.length_m, weight: 1.0 }
+        Measurement::new(Pairing { chuck_base_m, sphere_tool_m }, q, self.length_m)
     }
 }
 

@@ -1,8 +1,9 @@
 //! A robot's file as the board's parameters, and the board's parameters as something to compute with in f64.
 
-use ballbar::wire::{Answer, Command, ParameterSet, ParameterSetError, Refusal, Status, WhichSet};
+use ballbar::wire::{Answer, Command, ParameterSet, ParameterSetError, Refusal, Status, WhichSet, term_numbers};
 use ballbar::{
-    Chain, Coupling, Encoder, JointEncoders, JointKind, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading, SettledPose,
+    Chain, Coupling, Encoder, JointEncoders, JointKind, JointTerms, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading,
+    SettledPose,
 };
 use ballbar_calib::kinematics::CanonicalFrames;
 use ballbar_calib::model::Robot;
@@ -45,11 +46,12 @@ pub fn parameter_set(robot: &Robot, lvdt: LvdtCurve) -> Result<ParameterSet, Set
         return Err(unfit(format!("more than {} couplings", ballbar::MAX_COUPLINGS)));
     }
     // First as the file has it, so that what is wrong is named as it stands there; only how far its frames lie is none of the board's business.
-    match check(&set_of(robot, &robot.chain, lvdt), robot) {
+    match check(&set_of(robot, &robot.chain, &robot.terms, lvdt), robot) {
         Ok(()) | Err(ParameterSetError::Precision { .. }) => {}
         Err(error) => return Err(unfit(error.to_string())),
     }
-    let set = set_of(robot, CanonicalFrames::new(&robot.chain).chain(), lvdt);
+    let frames = CanonicalFrames::new(&robot.chain);
+    let set = set_of(robot, frames.chain(), &frames.terms(&robot.terms), lvdt);
     check(&set, robot).map_err(|error| unfit(error.to_string()))?;
     Ok(set)
 }
@@ -60,7 +62,7 @@ fn check(set: &ParameterSet, robot: &Robot) -> Result<(), ParameterSetError> {
     set.compile().and_then(|_| set.compile_within(&ranges)).map(|_| ())
 }
 
-fn set_of(robot: &Robot, chain: &Chain<f64>, lvdt: LvdtCurve) -> ParameterSet {
+fn set_of(robot: &Robot, chain: &Chain<f64>, terms: &JointTerms<f64>, lvdt: LvdtCurve) -> ParameterSet {
     let encoders = robot.encoders.iter().filter_map(|facts| facts.encoder);
     let couplings = robot.encoders.iter().flat_map(|facts| &facts.couplings);
     ParameterSet {
@@ -76,6 +78,7 @@ fn set_of(robot: &Robot, chain: &Chain<f64>, lvdt: LvdtCurve) -> ParameterSet {
             .take(ballbar::MAX_COUPLINGS)
             .collect(),
         lvdt,
+        terms: term_numbers(terms, chain.joints()),
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::num::NonZeroUsize;
 
-use ballbar::wire::{Answer, Command, MAX_PAYLOAD, ParameterSet, WhichSet};
-use ballbar::{Chain, LvdtCurve};
+use ballbar::wire::{Answer, Command, MAX_PAYLOAD, ParameterSet, ParameterSetError, WhichSet};
+use ballbar::{Kinematics, LvdtCurve};
 use ballbar_calib::model::{JointLimits, Robot, Standing};
 use serde::Serialize;
 use thiserror::Error;
@@ -162,7 +162,7 @@ impl<'a> Upload<'a> {
         }
         let set = parameter_set(robot, nominal_lvdt(NOMINAL_TRAVEL_M))?;
         if let Ok(compiled) = set.compile() {
-            let rounding = rounding_of_kinematics(&robot.chain, &robot.limits, &compiled, vectors.get());
+            let rounding = rounding_of_kinematics(&robot.kinematics(), &robot.limits, &compiled, vectors.get());
             if !rounding.is_small() {
                 return Err(UploadError::Coarse { robot: name(), rounding });
             }
@@ -191,7 +191,7 @@ impl<'a> Upload<'a> {
             }
         };
         let set = parameter_set(robot, curve)?;
-        let wanted = Wanted { set, chain: &robot.chain, limits: &robot.limits, vectors: self.vectors };
+        let wanted = Wanted { set, kinematics: &robot.kinematics(), limits: &robot.limits, vectors: self.vectors };
         Ok(store(link, &wanted, on_step)?.uploaded(replaced.map(|(old, _)| old), lvdt))
     }
 }
@@ -210,15 +210,16 @@ pub fn bring_back(
     let Answer::Parameters(set) = link.request(Command::ReadPrevious)? else {
         return Err(BoardError::WrongAnswer { command: "read previous parameters" }.into());
     };
-    let chain = set.compile().and_then(|_| set.chain());
-    let chain = chain.map_err(|error| UploadError::Unusable { name: set.name.as_str().to_owned(), reason: error.to_string() })?;
+    let kinematics = kinematics_of(&set);
+    let kinematics =
+        kinematics.map_err(|error| UploadError::Unusable { name: set.name.as_str().to_owned(), reason: error.to_string() })?;
     // The board does not know the joint limits.
     let limits: Vec<_> = set
         .usual_ranges()
         .into_iter()
         .map(|range| JointLimits { min: f64::from(*range.start()), max: f64::from(*range.end()) })
         .collect();
-    let stored = store(link, &Wanted { set, chain: &chain.cast(), limits: &limits, vectors }, on_step)?;
+    let stored = store(link, &Wanted { set, kinematics: &kinematics, limits: &limits, vectors }, on_step)?;
     Ok(stored.uploaded(replaced.map(|(old, _)| old), LvdtOrigin::BroughtBack))
 }
 
@@ -240,10 +241,16 @@ fn in_use(link: &mut BoardLink, on_step: &mut dyn FnMut(UploadStep)) -> Result<O
     }
 }
 
-/// A set for the board, with which it is to compute what `chain` does within `limits`.
+/// What a set computes, in this program's precision.
+fn kinematics_of(set: &ParameterSet) -> Result<Kinematics<f64>, ParameterSetError> {
+    set.compile()?;
+    Ok(Kinematics::with_terms(&set.chain()?.cast(), &set.joint_terms()?.cast()))
+}
+
+/// A set for the board, with which it is to compute what `kinematics` do within `limits`.
 struct Wanted<'a> {
     set: ParameterSet,
-    chain: &'a Chain<f64>,
+    kinematics: &'a Kinematics<f64>,
     limits: &'a [JointLimits],
     vectors: NonZeroUsize,
 }
@@ -292,13 +299,13 @@ fn stage_and_verify(
     bytes: &[u8],
     on_step: &mut dyn FnMut(UploadStep),
 ) -> Result<(u32, KinematicsDifference), UploadError> {
-    let Wanted { set, chain, limits, vectors } = wanted;
+    let Wanted { set, kinematics, limits, vectors } = wanted;
     let Answer::Staged { crc } = link.request(Command::WriteParameters(set.clone()))? else {
         return Err(BoardError::WrongAnswer { command: "write parameters" }.into());
     };
     check_read_back(link, WhichSet::Staged, bytes)?;
     let on_vector = || on_step(UploadStep::Compared);
-    let difference = verify_kinematics(link, chain, limits, WhichSet::Staged, vectors.get(), on_vector)?;
+    let difference = verify_kinematics(link, kinematics, limits, WhichSet::Staged, vectors.get(), on_vector)?;
     if difference.is_small() { Ok((crc, difference)) } else { Err(UploadError::Kinematics(difference)) }
 }
 

@@ -1,7 +1,7 @@
 //! Whether the board computes what the host computes.
 
 use ballbar::wire::{Answer, Command, CompiledParameters, ToolPose, WhichSet};
-use ballbar::{Chain, JointVector, Kinematics, MAX_JOINTS, Pose, Vector3};
+use ballbar::{Approach, Direction, JointVector, Kinematics, MAX_JOINTS, Pose, Vector3};
 use ballbar_calib::model::{JointLimits, Robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -44,15 +44,15 @@ impl KinematicsDifference {
 /// [`BoardError`].
 pub fn verify_kinematics(
     link: &mut BoardLink,
-    chain: &Chain<f64>,
+    kinematics: &Kinematics<f64>,
     limits: &[JointLimits],
     set: WhichSet,
     vectors: usize,
     mut on_vector: impl FnMut(),
 ) -> Result<KinematicsDifference, BoardError> {
     let mut difference = KinematicsDifference::default();
-    for (q, expected) in random_poses(chain, limits, vectors) {
-        difference.take(&board_pose(link, set, q)?, &expected);
+    for (q, approach, expected) in random_poses(kinematics, limits, vectors) {
+        difference.take(&board_pose(link, set, q, approach)?, &expected);
         on_vector();
     }
     Ok(difference)
@@ -60,16 +60,16 @@ pub fn verify_kinematics(
 
 /// What single precision alone makes of the poses: the same comparison with the board's own arithmetic, done here.
 pub fn rounding_of_kinematics(
-    chain: &Chain<f64>,
+    kinematics: &Kinematics<f64>,
     limits: &[JointLimits],
     compiled: &CompiledParameters,
     vectors: usize,
 ) -> KinematicsDifference {
     let mut difference = KinematicsDifference::default();
-    for (q, expected) in random_poses(chain, limits, vectors) {
+    for (q, approach, expected) in random_poses(kinematics, limits, vectors) {
         let mut vector = JointVector::zero();
         vector.as_array_mut()[..q.len()].copy_from_slice(&q);
-        difference.take(&ToolPose::from(&compiled.kinematics.base_from_tool(&vector)), &expected);
+        difference.take(&ToolPose::from(&compiled.kinematics.base_from_tool_approached(&vector, approach)), &expected);
     }
     difference
 }
@@ -81,8 +81,8 @@ pub fn rounding_of_kinematics(
 /// [`BoardError`].
 pub fn rms_kinematics(link: &mut BoardLink, truth: &Robot, vectors: usize) -> Result<f64, BoardError> {
     let mut squares = 0.0;
-    for (q, expected) in random_poses(&truth.chain, &truth.limits, vectors) {
-        let pose = board_pose(link, WhichSet::Active, q)?;
+    for (q, approach, expected) in random_poses(&truth.kinematics(), &truth.limits, vectors) {
+        let pose = board_pose(link, WhichSet::Active, q, approach)?;
         squares += (wide(pose.position_m) - expected.translation_m).norm_squared();
     }
     Ok((squares / vectors as f64).sqrt())
@@ -91,23 +91,33 @@ pub fn rms_kinematics(link: &mut BoardLink, truth: &Robot, vectors: usize) -> Re
 /// Encoder outputs as they travel.
 type WireVector = heapless::Vec<f32, MAX_JOINTS>;
 
-/// Random joint vectors within the limits, and the poses of the chain there.
-fn random_poses(chain: &Chain<f64>, limits: &[JointLimits], vectors: usize) -> impl Iterator<Item = (WireVector, Pose<f64>)> {
-    let kinematics = Kinematics::new(chain);
+/// Random joint vectors within the limits, from where each was approached, and the poses there.
+fn random_poses(
+    kinematics: &Kinematics<f64>,
+    limits: &[JointLimits],
+    vectors: usize,
+) -> impl Iterator<Item = (WireVector, Approach, Pose<f64>)> {
     let mut rng = ChaCha8Rng::seed_from_u64(560);
-    (0..vectors).map(move |_| {
+    (0..vectors).map(move |number| {
         // Rounded first: the joint values are the same for both.
         let q: WireVector = limits.iter().map(|limits| rng.random_range(limits.min..=limits.max) as f32).collect();
         let mut vector = JointVector::zero();
         for (exact, rounded) in vector.as_array_mut().iter_mut().zip(&q) {
             *exact = f64::from(*rounded);
         }
-        (q, kinematics.base_from_tool(&vector))
+        let approach = approach_of(number);
+        (q, approach, kinematics.base_from_tool_approached(&vector, approach))
     })
 }
 
-fn board_pose(link: &mut BoardLink, set: WhichSet, q: WireVector) -> Result<ToolPose, BoardError> {
-    match link.request(Command::ForwardKinematics { set, q })? {
+/// Every mixture of joints that rose and joints that fell, one after the other.
+fn approach_of(number: usize) -> Approach {
+    let direction = |joint| if number >> joint & 1 == 0 { Direction::Rising } else { Direction::Falling };
+    (0..MAX_JOINTS).fold(Approach::UNKNOWN, |approach, joint| approach.with(joint, Some(direction(joint))))
+}
+
+fn board_pose(link: &mut BoardLink, set: WhichSet, q: WireVector, approach: Approach) -> Result<ToolPose, BoardError> {
+    match link.request(Command::ForwardKinematics { set, q, approach })? {
         Answer::Pose(pose) => Ok(pose),
         _ => Err(BoardError::WrongAnswer { command: "forward kinematics" }),
     }

@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use ballbar::{Chain, Kinematics};
 use ballbar_calib::assess::{Assessment, Evidence};
 use ballbar_calib::identify::{Fit, FitOptions, ResidualSummary, fit, residuals};
 use ballbar_calib::model::{Dataset, Robot};
@@ -196,7 +197,7 @@ impl DemoReport {
         folder: &Path,
     ) -> Self {
         let (Scene { design, truth, .. }, fitted) = (scene, &fit.solution.chain);
-        let rms = |chain| ResidualSummary::new(&residuals(chain, other)).rms_m;
+        let rms = |chain: &Chain<f64>| ResidualSummary::new(&residuals(&Kinematics::new(chain), other)).rms_m;
         let change = |before_m, after_m| Change { before_mm: mm_from_m(before_m), after_mm: mm_from_m(after_m) };
         let tool = |chain| tool_error(&truth.chain, chain, &truth.limits, WORKSPACE_POSES, 0);
         let (before, after) = (tool(&design.chain), tool(fitted));

@@ -9,7 +9,7 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::inputs::{ForceArgs, OutputArgs};
+use super::inputs::{ForceArgs, OutputArgs, refuse_terms};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, warn, write_file};
 use crate::export::{Format, JointZero, export};
@@ -86,6 +86,7 @@ impl ExportArgs {
             return Err(NoUrdf.into());
         }
         let robot = open_robot(&self.robot)?;
+        refuse_terms(&robot, "export")?;
         let exported = export(&robot, self.format, self.joint_zero.unwrap_or_default())?;
         for remark in &exported.remarks {
             warn(remark);

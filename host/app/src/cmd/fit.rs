@@ -85,7 +85,7 @@ impl FitArgs {
         check_max_rms_mm(self.max_rms_mm)?;
         let measured = self.measured.read()?;
         let Measured { robot, rig, dataset, .. } = &measured;
-        let unknowns = self.unknowns.blocks(rig, dataset)?;
+        let unknowns = self.unknowns.blocks(robot, rig, dataset)?;
         let fit = fit(robot, dataset, &FitOptions { hold, damping, unknowns }).map_err(Remedied)?;
         let unseen: Vec<(String, &Dataset)> = measured.unseen().into_iter().collect();
         let evidence = Evidence { robot, rig, dataset, fit: &fit, unseen: &unseen, max_rms_m: self.max_rms_mm.map(m_from_mm) };

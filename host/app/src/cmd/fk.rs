@@ -1,6 +1,5 @@
 //! `host-cal fk`: where the tool is.
 
-use ballbar::Kinematics;
 use ballbar_calib::kinematics::link_angles;
 use ballbar_calib::model::Robot;
 use clap::Args;
@@ -60,7 +59,7 @@ impl FkArgs {
             warn(warning);
         }
         let q = robot.chain.joint_vector(&q).map_err(|_| wrong_count)?;
-        let base_from_tool = Kinematics::new(&robot.chain).base_from_tool(&q);
+        let base_from_tool = robot.kinematics().base_from_tool(&q);
         let r = base_from_tool.rotation;
         Ok(FkReport {
             position_mm: base_from_tool.translation_m.map(|m| positive_zero(mm_from_m(m))).into(),

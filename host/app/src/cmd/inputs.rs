@@ -89,6 +89,11 @@ impl MeasuredArgs {
     }
 }
 
+/// Refuses a robot whose joints have terms, where they would be left out.
+pub(super) fn refuse_terms(robot: &Robot, command: &'static str) -> Result<(), ListError> {
+    if robot.terms.are_zero() { Ok(()) } else { Err(ListError::JointTerms { robot: robot.source.clone(), command }) }
+}
+
 /// Whether `--max-rms-mm` can be a limit.
 pub(super) fn check_max_rms_mm(limit: Option<f64>) -> Result<(), ListError> {
     match limit.filter(|&limit| limit.is_nan() || limit <= 0.0) {
@@ -104,6 +109,17 @@ pub(super) enum ListError {
     #[error("no pose has one of the pairings {0}")]
     #[diagnostic(help("The poses have {1}."))]
     NoPoseLeft(String, String),
+    /// Joint terms where they would be left out.
+    #[error("{robot}: its joints have terms, which `host-cal {command}` would leave out")]
+    #[diagnostic(help(
+        "Take eccentricity, compliance and backlash out of a copy of the file. docs/files.md says which commands know them."
+    ))]
+    JointTerms {
+        /// The file.
+        robot: String,
+        /// The command.
+        command: &'static str,
+    },
     /// No bar length to simulate.
     #[error("the rig names no bar length")]
     #[diagnostic(help("Give one, in millimetres: --bar 460"))]

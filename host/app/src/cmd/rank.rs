@@ -65,7 +65,7 @@ impl RankArgs {
 
 fn report(measured: Measured) -> RankReport {
     let Measured { robot, rig, dataset, warnings, .. } = measured;
-    let found = Identifiability::new(&robot.chain, &dataset.measurements(), &robot.limits, &[]);
+    let found = Identifiability::of_robot(&robot, &dataset);
     RankReport {
         poses: dataset.rows.len(),
         pairings: dataset.pairings().into_iter().map(|pairing| rig.pairing_name(pairing)).collect(),

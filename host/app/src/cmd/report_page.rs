@@ -114,7 +114,7 @@ impl ReportArgs {
         let others = self.others(&measured)?;
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;
-        let unknowns = self.unknowns.blocks(&measured.rig, &measured.dataset)?;
+        let unknowns = self.unknowns.blocks(&measured.robot, &measured.rig, &measured.dataset)?;
         let fit =
             fit(&measured.robot, &measured.dataset, &FitOptions { hold, unknowns, ..FitOptions::default() }).map_err(Remedied)?;
 

@@ -1,6 +1,6 @@
 //! What a fit finds out beside the robot: `--unknown`.
 
-use ballbar_calib::model::{Dataset, Rig};
+use ballbar_calib::model::{Dataset, Rig, Robot};
 use ballbar_calib::unknowns::{AnyBlock, Kind};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -11,7 +11,8 @@ use crate::remedies::Remedied;
 #[derive(Args)]
 pub(super) struct UnknownArgs {
     /// What is not known beside the robot and is found out with it: the zero of the bar or of each rod, the bar's gain or latency, where
-    /// chucks and spheres are (within `tolerance_mm` of the rig file), an offset of each set
+    /// chucks and spheres are (within `tolerance_mm` of the rig file), an offset of each set, how far joints yield to the masses they
+    /// bear, encoders are off their axes, and joints lag behind them
     #[arg(long, value_name = "KIND,…", value_delimiter = ',', value_parser = kinds())]
     unknown: Vec<Kind>,
 }
@@ -22,8 +23,8 @@ fn kinds() -> impl TypedValueParser<Value = Kind> {
 
 impl UnknownArgs {
     /// The unknowns that these poses have of each kind, kinds that stand twice once.
-    pub(super) fn blocks(&self, rig: &Rig, dataset: &Dataset) -> Result<Vec<AnyBlock>, CommandError> {
+    pub(super) fn blocks(&self, robot: &Robot, rig: &Rig, dataset: &Dataset) -> Result<Vec<AnyBlock>, CommandError> {
         let asked = Kind::ALL.into_iter().filter(|kind| self.unknown.contains(kind));
-        Ok(asked.map(|kind| kind.block(rig, dataset).map_err(Remedied)).collect::<Result<_, _>>()?)
+        Ok(asked.map(|kind| kind.block(robot, rig, dataset).map_err(Remedied)).collect::<Result<_, _>>()?)
     }
 }

@@ -62,7 +62,7 @@ impl ValidateArgs {
     fn report(&self, measured: Measured) -> ValidateReport {
         let Measured { robot, rig, dataset, held_out, warnings, .. } = measured;
         let (rule, dataset) = held_out.map_or((None, dataset), |(rule, rows)| (Some(rule.to_string()), rows));
-        let residuals = residuals(&robot.chain, &dataset);
+        let residuals = residuals(&robot.kinematics(), &dataset);
         let summary = ResidualSummary::new(&residuals);
         let rms_mm = mm_from_m(summary.rms_m);
         ValidateReport {

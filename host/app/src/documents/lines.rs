@@ -102,7 +102,7 @@ pub struct HeldOutRows {
 impl HeldOutRows {
     /// With a rule in words, of a design and a fit.
     pub fn new(rule: &str, rows: &Dataset, design: &Robot, fit: &Fit) -> Self {
-        let initial = ResidualSummary::new(&residuals(&design.chain, rows));
+        let initial = ResidualSummary::new(&residuals(&design.kinematics(), rows));
         let after = ResidualSummary::new(&fit.residuals_of(rows));
         Self {
             rule: rule.to_owned(),

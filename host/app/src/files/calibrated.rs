@@ -43,7 +43,9 @@ pub fn write_calibrated(
     assessment: &Assessment,
 ) -> Result<bool, CalibratedError> {
     let Some((chain, calibration)) = calibration(evidence, assessment) else { return Ok(false) };
-    let edited = calibrated_toml(design, chain, &calibration);
+    let is_unchanged = assessment.answer == Answer::Unchanged;
+    let terms = if is_unchanged { evidence.robot.terms } else { evidence.fit.terms(evidence.robot) };
+    let edited = calibrated_toml(design, chain, &terms, &calibration);
     let text = edited.map_err(|error| CalibratedError::Edit { name: design.name().to_owned(), reason: error.to_string() })?;
     Output { path, kind: FileKind::Robot, force }.write(&text)?;
     Ok(true)

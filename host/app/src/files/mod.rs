@@ -17,6 +17,7 @@ mod read_poses;
 mod reading;
 mod rig;
 mod robot;
+mod robot_terms;
 pub mod session_names;
 mod solids;
 mod source;

@@ -31,6 +31,8 @@ pub(super) enum Range {
     Deviation,
     /// A standard deviation in millimetres, or zero.
     Tolerance,
+    /// A mass in kilograms.
+    Mass,
     /// A joint's scale.
     Scale,
     /// Encoder counts per turn or millimetre.
@@ -50,6 +52,7 @@ impl Range {
             Self::Positive => x > 0.0 && x <= MOST,
             Self::Deviation => (1e-6..=MOST).contains(&x),
             Self::Tolerance => x == 0.0 || Self::Deviation.contains(x),
+            Self::Mass => (0.0..=1e5).contains(&x),
             Self::Scale => (1e-3..=1e3).contains(&x.abs()),
             Self::Counts => x > 0.0 && x <= 1e12,
             Self::IndexCounts => (16.0..=1e6).contains(&x) && x.fract() == 0.0,
@@ -64,6 +67,7 @@ impl Range {
             Self::Positive => "a number above 0, at most 1e6",
             Self::Deviation => "a number from 1e-6 to 1e6",
             Self::Tolerance => "0, or a number from 1e-6 to 1e6",
+            Self::Mass => "a number from 0 to 1e5",
             Self::Scale => "a number of size 0.001 to 1000",
             Self::Counts => "a number above 0, at most 1e12",
             Self::IndexCounts => "a whole number from 16 to 1e6",

@@ -100,7 +100,7 @@ pub fn read_plan(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PlanRo
         longitude: rows.required("longitude_deg")?,
         length: rows.required("length_mm")?,
     };
-    let kinematics = Kinematics::new(&robot.chain);
+    let kinematics = robot.kinematics();
     rows.records().iter().map(|record| read_row(&rows, rig, &columns, &kinematics, record)).collect()
 }
 

@@ -1,5 +1,6 @@
 //! What can be wrong with an input file, and what to do about it.
 
+use ballbar::TermsError;
 use thiserror::Error;
 
 use crate::text::one_line;
@@ -114,6 +115,34 @@ pub enum Problem {
         /// Upper limit as in the file.
         max: f64,
     },
+    /// Terms of joints, or masses, that no robot has.
+    #[error("{0}")]
+    Terms(TermsError),
+    /// A list of something else than a joint's four coefficients.
+    #[error("`eccentricity_deg` has {found} numbers, expected 4")]
+    Eccentricity {
+        /// How many stand there.
+        found: usize,
+    },
+    /// A mass that is nowhere, or a centre of nothing.
+    #[error("`{found}` without `{missing}`")]
+    HalfABody {
+        /// The key that is there.
+        found: &'static str,
+        /// The key that is not.
+        missing: &'static str,
+    },
+    /// No sign, or not one for each joint.
+    #[error("column `approach`: `{found}`, expected one of +, - and 0 for each of {joints} joints")]
+    Approach {
+        /// What stands there.
+        found: String,
+        /// Joints of the robot.
+        joints: usize,
+    },
+    /// A direction of gravity that is none.
+    #[error("`gravity` has no direction")]
+    NoGravity,
     /// Coupling to a joint that is not nearer to the base, or twice to the same.
     #[error("joint {joint} is coupled to joint {to}, expected a joint nearer to the base, and each once")]
     Coupling {
@@ -310,6 +339,22 @@ impl Problem {
             Self::JointKeyMissing { .. } => "A joint needs type, offset, scale and both limits.",
             Self::NotANumber { .. } => "Write a plain decimal number with a point.",
             Self::Limits { .. } => "Limits are those of the encoder output q.",
+            Self::Terms(TermsError::NoLoad { .. }) => {
+                "Gravity does it: give mass_kg and center_mm of the links behind the joint, or payload = { mass_kg = …, center_mm = […] }."
+            }
+            Self::Terms(TermsError::EccentricSlide { .. }) => {
+                "Eccentricity is that of an encoder's disc, which turns with the joint."
+            }
+            Self::Terms(_) | Self::HalfABody { .. } => {
+                "The keys of joint terms and masses, and their units, are in docs/files.md."
+            }
+            Self::Eccentricity { .. } => "They are the coefficients of sin q, cos q, sin 2q and cos 2q.",
+            Self::Approach { .. } => {
+                "+ where the joint's value rose on the way there, - where it fell, 0 where that is not known: +-00+-"
+            }
+            Self::NoGravity => {
+                "It is the direction in which things fall, in the base frame: gravity = [0, 0, -1] of a robot that stands upright."
+            }
             Self::Coupling { .. } => {
                 "`coupling = { joint = 5, ratio = 0.18 }` on joint 6: it turns by 0.18 of joint 5's turn. Several are a list: [{ … }, { … }]."
             }

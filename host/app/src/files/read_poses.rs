@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use ballbar::Measurement;
+use ballbar::{Approach, Direction, Measurement};
 use ballbar_calib::model::{Dataset, MixedSigma, Motion, PoseRow, Rig, Robot};
 use csv::StringRecord;
 
 use super::csv_rows::{CsvRows, Expected};
 use super::numbers::Range as Of;
-use super::problem::Problem;
+use super::problem::{Problem, short};
 use super::source::{InputError, Source};
 use crate::units::m_from_mm;
 
@@ -41,6 +41,7 @@ struct Columns {
     length: usize,
     sigma: Option<usize>,
     set: Option<usize>,
+    approach: Option<usize>,
     t: Option<usize>,
     bar: Option<usize>,
     /// Of the rate and of the lag.
@@ -50,9 +51,9 @@ struct Columns {
 /// All rows of one file, weighted alike.
 fn read_rows(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PoseRow>, InputError> {
     const REQUIRED: [&str; 3] = ["chuck", "sphere", "length_mm"];
-    const OPTIONAL: [&str; 7] = ["sigma_mm", "set", "t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
+    const OPTIONAL: [&str; 8] = ["approach", "sigma_mm", "set", "t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
     const HEADER: &str = "chuck,sphere,q1_deg,…,qJ_deg,length_mm in any order (qi_mm for a prismatic joint); \
-                          optional: sigma_mm, set, t_s, bar_mm, plan_row, rate_mm_s, lag_ms";
+                          optional: approach, sigma_mm, set, t_s, bar_mm, plan_row, rate_mm_s, lag_ms";
     const EXPECTED: Expected<'_> =
         Expected { rows_are: "poses", required: &REQUIRED, optional: &OPTIONAL, joints_are_optional: false, header: HEADER };
     let rows = CsvRows::split(source, robot, &EXPECTED)?;
@@ -63,6 +64,7 @@ fn read_rows(source: &Source, robot: &Robot, rig: &Rig) -> Result<Vec<PoseRow>, 
         length: rows.required("length_mm")?,
         sigma: rows.optional("sigma_mm"),
         set: rows.optional("set"),
+        approach: rows.optional("approach"),
         t: rows.optional("t_s"),
         bar: rows.optional("bar_mm"),
         motion: rows.optional("rate_mm_s").zip(rows.optional("lag_ms")),
@@ -79,7 +81,8 @@ fn read_row(rows: &CsvRows<'_>, rig: &Rig, columns: &Columns, record: &StringRec
     let bar = columns.bar.map(|column| rows.number(record, column, Of::Positive));
     Ok(PoseRow {
         pairing,
-        measurement: Measurement { pairing: rig.pairing(pairing), q, length_m, weight: 1.0 },
+        measurement: Measurement::new(rig.pairing(pairing), q, length_m),
+        approach: columns.approach.map_or(Ok(Approach::UNKNOWN), |column| read_approach(rows, record, column))?,
         sigma_m: sigma.transpose()?.map(m_from_mm),
         set: columns.set.map(|column| record[column].to_owned()),
         t_s: t_s.transpose()?,
@@ -89,6 +92,24 @@ fn read_row(rows: &CsvRows<'_>, rig: &Rig, columns: &Columns, record: &StringRec
         line: rows.line(record),
         number: 0,
     })
+}
+
+/// `+`, `-` or `0` for each joint; an empty field says nothing of any.
+fn read_approach(rows: &CsvRows<'_>, record: &StringRecord, column: usize) -> Result<Approach, InputError> {
+    let (field, joints) = (&record[column], rows.robot.chain.joints());
+    let direction = |sign| match sign {
+        '+' => Some(Some(Direction::Rising)),
+        '-' => Some(Some(Direction::Falling)),
+        '0' => Some(None),
+        _ => None,
+    };
+    let directions: Option<Vec<_>> = field.chars().map(direction).collect();
+    match directions.filter(|directions| directions.is_empty() || directions.len() == joints) {
+        Some(directions) => {
+            Ok(directions.into_iter().enumerate().fold(Approach::UNKNOWN, |approach, (i, way)| approach.with(i, way)))
+        }
+        None => Err(rows.refuse_field(record, column, Problem::Approach { found: short(field, 20), joints })),
+    }
 }
 
 /// Of an arm that moved; both fields are empty for one that stood.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use ballbar::{Chain, Coupling, Encoder, JointKind, MAX_JOINTS};
+use ballbar::{Chain, Coupling, Encoder, JointKind, JointTerms, MAX_JOINTS};
 use ballbar_calib::model::{Calibration, EncoderFacts, JointLimits, Robot};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
@@ -14,6 +14,7 @@ use toml_edit::{DocumentMut, Item, Table, value};
 use super::builtin::ROBOTS;
 use super::numbers::{Range as Of, deserialize, in_range, vector};
 use super::problem::{Problem, short};
+use super::robot_terms::{BodyToml, JointTermsToml, TermsReader, eccentricity, set_terms};
 use super::source::{InputError, Source};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, tidy};
@@ -27,6 +28,8 @@ struct RobotToml {
     name: Option<Spanned<String>>,
     links: Vec<LinkToml>,
     joints: Vec<Spanned<JointToml>>,
+    gravity: Option<Spanned<Vec<Spanned<f64>>>>,
+    payload: Option<Spanned<BodyToml>>,
     calibration: Option<Calibration>,
 }
 
@@ -35,6 +38,8 @@ struct RobotToml {
 struct LinkToml {
     translation_mm: Spanned<Vec<Spanned<f64>>>,
     rotation_deg: Spanned<Vec<Spanned<f64>>>,
+    mass_kg: Option<Spanned<f64>>,
+    center_mm: Option<Spanned<Vec<Spanned<f64>>>>,
 }
 
 #[derive(Deserialize)]
@@ -54,6 +59,11 @@ struct JointToml {
     counts_per_index: Option<Spanned<f64>>,
     sign: Option<Spanned<f64>>,
     coupling: Option<CouplingsToml>,
+    eccentricity_deg: Option<Spanned<Vec<Spanned<f64>>>>,
+    compliance_deg_per_nm: Option<Spanned<f64>>,
+    compliance_mm_per_n: Option<Spanned<f64>>,
+    backlash_deg: Option<Spanned<f64>>,
+    backlash_mm: Option<Spanned<f64>>,
 }
 
 /// One table or a list of them.
@@ -133,7 +143,9 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
     let mut kinds = Vec::new();
     let mut limits = Vec::new();
     let mut encoders = Vec::new();
+    let mut terms = TermsReader::new(source);
     for (i, link) in file.links.iter().enumerate() {
+        terms.link(i, &link.mass_kg, &link.center_mm)?;
         parameters.extend(vector(source, "translation_mm", &link.translation_mm)?.map(m_from_mm));
         parameters.extend(vector(source, "rotation_deg", &link.rotation_deg)?.map(f64::to_radians));
         if let Some(joint) = file.joints.get(i) {
@@ -143,21 +155,29 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
             parameters.extend([offset, scale]);
             limits.push(reader.limits()?);
             encoders.push(reader.encoder()?);
+            terms.joint(i, &reader.terms()?);
         }
     }
     let chain = Chain::new(&kinds, &parameters).map_err(|error| of_file(Problem::Toml(error.to_string())))?;
+    let terms = terms.finish(&kinds, &file.gravity, &file.payload)?;
     let name = match &file.name {
         Some(name) => robot_name(source, name)?,
         None => one_line(source.name()).into_owned(),
     };
-    Ok(Robot { name, source: source.name().to_owned(), chain, limits, encoders, calibration: file.calibration })
+    Ok(Robot { name, source: source.name().to_owned(), chain, terms, limits, encoders, calibration: file.calibration })
 }
 
-/// A robot's text, comments and all, with other parameters and a `[calibration]` table.
+/// A robot's text, comments and all, with other parameters, other joint terms where they have changed, and a `[calibration]` table.
 ///
 /// # Errors
 /// The reason why the text could not be edited.
-pub fn calibrated_toml(source: &Source, chain: &Chain<f64>, calibration: &Calibration) -> Result<String, toml_edit::TomlError> {
+pub fn calibrated_toml(
+    source: &Source,
+    chain: &Chain<f64>,
+    terms: &JointTerms<f64>,
+    calibration: &Calibration,
+) -> Result<String, toml_edit::TomlError> {
+    let written = parse_robot(source).map_or_else(|_| JointTerms::none(), |robot| robot.terms);
     let mut document: DocumentMut = source.text().parse()?;
     for i in 0..=chain.joints() {
         let Some(link) = chain.link(i) else { continue };
@@ -169,6 +189,7 @@ pub fn calibrated_toml(source: &Source, chain: &Chain<f64>, calibration: &Calibr
             let unit = ScreenUnit::from(joint.kind);
             set_number(&mut document["joints"][i][&format!("offset_{}", unit.name())], unit.from_si(joint.offset));
             set_number(&mut document["joints"][i]["scale"], joint.scale);
+            set_terms(&mut document["joints"][i], joint.kind, written.of_joint(i), terms.of_joint(i));
         }
     }
     document.insert("calibration", Item::Table(calibration_table(calibration)));
@@ -245,6 +266,35 @@ impl JointReader<'_> {
         })
     }
 
+    /// Coefficients of the joint's terms in SI, and where they stand.
+    fn terms(&self) -> Result<JointTermsToml, InputError> {
+        let joint = self.joint;
+        let ((compliance_key, compliance), (_, other)) = self.by_kind(
+            ("compliance_deg_per_nm", &joint.compliance_deg_per_nm),
+            ("compliance_mm_per_n", &joint.compliance_mm_per_n),
+        );
+        let ((backlash_key, backlash), (_, other_backlash)) =
+            self.by_kind(("backlash_deg", &joint.backlash_deg), ("backlash_mm", &joint.backlash_mm));
+        if let Some(other) = other {
+            return Err(self.wrong_unit(other.span(), "compliance_deg_per_nm", "compliance_mm_per_n"));
+        }
+        if let Some(other) = other_backlash {
+            return Err(self.wrong_unit(other.span(), "backlash_deg", "backlash_mm"));
+        }
+        let unit = ScreenUnit::from(self.kind().0);
+        let si = |key, number: &Option<Spanned<f64>>| match number {
+            Some(number) => {
+                in_range(self.source, key, number, Of::Plausible).map(|value| Some((unit.to_si(value), number.span())))
+            }
+            None => Ok(None),
+        };
+        Ok(JointTermsToml {
+            eccentricity_rad: joint.eccentricity_deg.as_ref().map(|list| eccentricity(self.source, list)).transpose()?,
+            compliance: si(compliance_key, compliance)?,
+            backlash: si(backlash_key, backlash)?,
+        })
+    }
+
     fn rises(&self) -> Result<bool, InputError> {
         let Some(sign) = &self.joint.sign else { return Ok(true) };
         match *sign.as_ref() {
@@ -308,7 +358,7 @@ impl JointReader<'_> {
 type Key<'a> = (&'static str, &'a Option<Spanned<f64>>);
 
 /// Replaces a number and keeps the comment behind it.
-fn set_number(item: &mut Item, number: f64) {
+pub(super) fn set_number(item: &mut Item, number: f64) {
     let decor = item.as_value().map(|old| old.decor().clone());
     *item = value(number);
     if let (Some(new), Some(decor)) = (item.as_value_mut(), decor) {

@@ -1,6 +1,6 @@
 //! The experiment end to end: shells, fit, the other radius, Table I and II, residuals, and what one sphere can tell.
 
-use ballbar::{Measurement, Parameter, ParameterUnit, Vector3};
+use ballbar::{Kinematics, Measurement, Parameter, ParameterUnit, Vector3};
 use ballbar_calib::identify::{
     AndersonDarling, Fit, FitError, FitOptions, FittedParameter, Hold, Observation, Residual, ResidualSummary, Spectrum,
     anderson_darling, fit, residuals,
@@ -134,10 +134,10 @@ pub fn run(seed: u64, mut on_step: impl FnMut(f64)) -> Result<Experiment, Experi
     let share = 0.7 / f64::from(ranks.subsets());
     let table_one = ranks.classes(|| on_step(share));
 
-    let fitted_chain = &fit.solution.chain;
+    let fitted = Kinematics::new(&fit.solution.chain);
     let platform = StewartPlatform { base_side_m: 0.2, plate_side_m: 0.1, bar_m: m_from_mm(stated::FITTED_RADIUS_MM) };
     Ok(Experiment {
-        other_radius: ResidualSummary::new(&residuals(fitted_chain, &other)),
+        other_radius: ResidualSummary::new(&residuals(&fitted, &other)),
         normality: anderson_darling(&fit.residuals.iter().map(|f| f.value_m).collect::<Vec<_>>()),
         by_longitude: by_longitude(&fitted_shells, &fit.residuals),
         noise_free_worst: worst_difference(noise_free.solution.chain.parameters(), truth.chain.parameters()),
@@ -147,7 +147,7 @@ pub fn run(seed: u64, mut on_step: impl FnMut(f64)) -> Result<Experiment, Experi
         sphere_beside_axis: with_sphere_at(&design, &fitted_shells, Vector3::new(1e-6, 0.0, 0.05)),
         stewart_amplification: amplification(&platform).unwrap_or(f64::NAN),
         tool_before: tool_error(&truth.chain, &design.chain, &truth.limits, WORKSPACE_POSES, seed),
-        tool_after: tool_error(&truth.chain, fitted_chain, &truth.limits, WORKSPACE_POSES, seed),
+        tool_after: tool_error(&truth.chain, &fit.solution.chain, &truth.limits, WORKSPACE_POSES, seed),
         table_two: recovered(&fit, &truth),
         fit,
     })

@@ -1,7 +1,7 @@
 //! What is known of the arm at this moment.
 
 use ballbar::wire::{Status, StreamedPose};
-use ballbar::{Chain, Kinematics, LvdtReading, Pairing, Sample, Stillness};
+use ballbar::{Chain, JointTerms, Kinematics, LvdtReading, Pairing, Sample, Stillness};
 use serde::{Serialize, Serializer};
 
 use crate::board::RobotOnBoard;
@@ -35,6 +35,7 @@ pub struct Latest {
 #[derive(Clone, Debug)]
 pub(super) struct ExpectedLength {
     chain: Chain<f64>,
+    terms: JointTerms<f64>,
     pairing: Pairing<f64>,
 }
 
@@ -43,14 +44,14 @@ impl ExpectedLength {
     pub(super) fn new(robot: &RobotOnBoard, pairing: Pairing<f64>) -> Option<Self> {
         let parameters: Vec<f64> = robot.set().parameters.iter().map(|&value| f64::from(value)).collect();
         let chain = Chain::new(robot.kinds(), &parameters).ok()?;
-        Some(Self { chain, pairing })
+        Some(Self { chain, terms: robot.set().joint_terms().ok()?.cast(), pairing })
     }
 
     /// Millimetres, at joint values in degrees or millimetres.
     pub(super) fn length_mm(&self, q: &[f64]) -> Option<f64> {
         let si: Vec<f64> = self.chain.joint_kinds().iter().zip(q).map(|(&kind, &q)| ScreenUnit::from(kind).to_si(q)).collect();
         let q = self.chain.joint_vector(&si).ok()?;
-        Some(mm_from_m(Kinematics::new(&self.chain).length(&q, &self.pairing)))
+        Some(mm_from_m(Kinematics::with_terms(&self.chain, &self.terms).length(&q, &self.pairing)))
     }
 }
 

@@ -151,7 +151,7 @@ impl Facts {
     pub fn new(inputs: &Inputs<'_>) -> Self {
         let Inputs { robot, rig, dataset, fit, .. } = inputs;
         let pairings = dataset.pairings();
-        let before = residuals(&robot.chain, dataset);
+        let before = residuals(&robot.kinematics(), dataset);
         let rows = rows(inputs, &pairings, &before);
         Self {
             robot: robot.name.clone(),

@@ -102,8 +102,8 @@ impl<'a> Predictor<'a> {
     fn new(robot: &Robot, fit: &'a Fit) -> Self {
         let free = fit.parameters.iter().enumerate().filter(|(_, parameter)| parameter.held.is_none());
         Self {
-            design: Kinematics::new(&robot.chain),
-            fitted: Kinematics::new(&fit.solution.chain),
+            design: robot.kinematics(),
+            fitted: Kinematics::with_terms(&fit.solution.chain, &fit.terms(robot)),
             free: free.map(|(index, _)| index).collect(),
             parameters: fit.unknowns.of_chain().len(),
             covariance: &fit.uncertainty.covariance,

@@ -98,7 +98,7 @@ impl Plant {
         let rest = Rest::at_start(Held::new(&encoders, &q));
         let start_counts = rest.at(0).counts;
         Ok(Self {
-            truth: Kinematics::new(&truth.chain),
+            truth: truth.kinematics(),
             kinds: truth.chain.joint_kinds().to_vec(),
             encoders,
             lvdt: lvdt_curve(travel_m),
@@ -107,7 +107,7 @@ impl Plant {
             phase: Phase::Rest(Box::new(rest)),
             waiting: VecDeque::new(),
             speed: JointSpeed::default(),
-            backlash: Backlash::none(&q),
+            backlash: Backlash::new(truth, &q),
             lvdt_lag: Lag::default(),
             now_us: 0,
             scripts: 0,

@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use ballbar::{JointVector, MAX_JOINTS};
+use ballbar::{JointVector, MAX_JOINTS, TermKind};
+use ballbar_calib::model::Robot;
 
 /// Play between an encoder, which sits at the motor, and its joint: the joint follows only where the play is used up.
 #[derive(Clone, Debug)]
@@ -14,9 +15,14 @@ pub(super) struct Backlash {
 }
 
 impl Backlash {
-    /// No play, at these encoder outputs.
-    pub(super) fn none(q: &JointVector<f64>) -> Self {
-        Self { half: [0.0; MAX_JOINTS], joint_q: *q }
+    /// The play of a robot's joints, which stand in the middle of it at these encoder outputs. A joint that its terms have run before
+    /// its encoder has none.
+    pub(super) fn new(robot: &Robot, q: &JointVector<f64>) -> Self {
+        let half = |joint| {
+            let scale = robot.chain.joint(joint).map_or(1.0, |joint| joint.scale);
+            (robot.terms.coefficient(joint, TermKind::Backlash) / scale).max(0.0)
+        };
+        Self { half: std::array::from_fn(half), joint_q: *q }
     }
 
     /// Where the joints are when the encoders have come to `q`.
@@ -65,8 +71,7 @@ mod tests {
             q.as_array_mut()[0] = value;
             q
         };
-        let mut backlash = Backlash::none(&at(0.0));
-        backlash.half[0] = 0.5;
+        let mut backlash = Backlash { half: [0.5; MAX_JOINTS], joint_q: at(0.0) };
         let joint = |backlash: &mut Backlash, q: f64| backlash.follow(&at(q)).as_array()[0];
         assert_eq!(joint(&mut backlash, 0.4), 0.0);
         assert_eq!(joint(&mut backlash, 2.0), 1.5);

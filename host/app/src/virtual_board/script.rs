@@ -1,6 +1,6 @@
 //! What the simulated robot does: stations at which it stands and measures, and how fast it goes from one to the next.
 
-use ballbar::{JointKind, JointVector, Kinematics, Pairing};
+use ballbar::{JointKind, JointVector, Pairing};
 use ballbar_calib::simulate::{ShellError, Shells};
 
 use crate::robot_link::JointSpeed;
@@ -59,7 +59,7 @@ impl Script {
     /// # Errors
     /// [`ShellError`] when a shell has too few points that the robot reaches.
     pub fn from_shells(shells: &Shells<'_>, dwell_s: f64, speed: JointSpeed, on_pose: impl FnMut()) -> Result<Self, ShellError> {
-        let truth = Kinematics::new(&shells.truth.chain);
+        let truth = shells.truth.kinematics();
         let stations = shells.simulate(on_pose)?.into_iter().map(|pose| {
             let measurement = pose.row.measurement;
             Station {

@@ -112,7 +112,7 @@ impl Assessment {
             refusals: Vec::new(),
             suspicion: None,
             rms_limit,
-            proofs: proofs(evidence, residuals(&robot.chain, dataset)),
+            proofs: proofs(evidence, residuals(&robot.kinematics(), dataset)),
             trend: trend(evidence, &placed),
             farthest_offset: offset(evidence, &placed),
             by_pairing: placed.into_iter().map(|group| group.into_iter().map(|(_, residual)| residual).collect()).collect(),

@@ -219,7 +219,7 @@ pub(super) fn any_constant(evidence: &Evidence<'_>) -> Option<Mistake> {
 
 /// What each row's length is too short by: the median of what those of its bar, set and file are by the design.
 fn missing_m(evidence: &Evidence<'_>) -> Vec<f64> {
-    let residuals = residuals(&evidence.robot.chain, evidence.dataset);
+    let residuals = residuals(&evidence.robot.kinematics(), evidence.dataset);
     let mut groups: HashMap<_, Vec<usize>> = HashMap::new();
     for (i, row) in evidence.dataset.rows.iter().enumerate() {
         groups.entry((row.file, row.set.as_deref(), row.bar_m.map(f64::to_bits))).or_default().push(i);

@@ -30,7 +30,7 @@ impl fmt::Display for Change {
             ScreenUnit::Millimetre => write!(f, "{} by {} mm", self.part, fixed(size, 0)),
             ScreenUnit::Degree => write!(f, "{} by {}°", self.part, fixed(size, 0)),
             ScreenUnit::One => write!(f, "{} by {}", self.part, fixed(size, 3)),
-            ScreenUnit::Millisecond => write!(f, "{} by {} ms", self.part, fixed(size, 1)),
+            other => write!(f, "{} by {} {}", self.part, fixed(size, 3), other.name()),
         }
     }
 }

@@ -95,7 +95,7 @@ pub(super) fn proofs(evidence: &Evidence<'_>, before: Vec<Residual>) -> Vec<Proo
     let kinds = robot.chain.joint_kinds();
     let proof = |name: String, kind: ProofKind, rows: &Dataset| {
         let postures = postures(kinds, rows.rows.iter().map(|row| &row.measurement.q));
-        Proof { name, kind, before: residuals(&robot.chain, rows), after: fit.residuals_of(rows), postures }
+        Proof { name, kind, before: residuals(&robot.kinematics(), rows), after: fit.residuals_of(rows), postures }
     };
     let (mut apart, mut same) = (Vec::new(), Vec::new());
     for (name, rows) in evidence.unseen {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ballbar::ParameterUnit;
+use ballbar::{JointTerms, ParameterUnit};
 
 use super::cross_validation::CrossValidation;
 use super::hold::Held;
@@ -11,7 +11,7 @@ use super::lm::Solution;
 use super::residual::{Residual, ResidualSummary};
 use super::residuals::{Outlier, PairingResiduals};
 use super::uncertainty::Uncertainty;
-use crate::model::{Dataset, Rig};
+use crate::model::{Dataset, Rig, Robot};
 use crate::unknowns::Unknowns;
 
 /// One unknown before and after.
@@ -80,6 +80,11 @@ impl Fit {
     /// Residuals of any rows that were measured with the same rig, with the fitted values of all unknowns.
     pub fn residuals_of(&self, dataset: &Dataset) -> Vec<Residual> {
         Residual::of_rows(&self.unknowns, &self.solution.values, dataset.rows.iter())
+    }
+
+    /// The terms of the robot's joints, with what was found beside those that it had.
+    pub fn terms(&self, robot: &Robot) -> JointTerms<f64> {
+        self.unknowns.terms(&self.solution.values, &robot.terms)
     }
 
     /// The rig as it was found to be.

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use ballbar::{Chain, Damping, LmOptions, Parameter};
+use ballbar::{Chain, Damping, JointTerms, LmOptions, Parameter};
 use thiserror::Error;
 
 use super::cross_validation::cross_validate;
@@ -82,11 +82,11 @@ pub enum FitError {
 /// [`FitError`] when there are no more poses than free parameters, or when a parameter is to be held that the robot lacks.
 pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
     if !options.hold.is_of_any_frames() {
-        return fit_as_written(&robot.chain, &robot.limits, dataset, options);
+        return fit_as_written(&robot.chain, &robot.terms, &robot.limits, dataset, options);
     }
     let frames = CanonicalFrames::new(&robot.chain);
-    let canonical = fit_as_written(frames.chain(), &robot.limits, dataset, options)?;
-    let unknowns = Unknowns::new(&robot.chain, options.unknowns.clone());
+    let canonical = fit_as_written(frames.chain(), &frames.terms(&robot.terms), &robot.limits, dataset, options)?;
+    let unknowns = Unknowns::new(&robot.chain, &robot.terms, options.unknowns.clone());
     let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
     let observation = Observation::of(&unknowns, &unknowns.start(), &rows, sigma_of(dataset));
     let found = Identifiability::of(unknowns.of_chain(), unknowns.list(), &observation, &robot.limits, &[]);
@@ -94,8 +94,14 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
 }
 
 /// The same in the frames in which the chain is written.
-fn fit_as_written(design: &Chain<f64>, limits: &[JointLimits], dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
-    let unknowns = Unknowns::new(design, options.unknowns.clone());
+fn fit_as_written(
+    design: &Chain<f64>,
+    terms: &JointTerms<f64>,
+    limits: &[JointLimits],
+    dataset: &Dataset,
+    options: &FitOptions,
+) -> Result<Fit, FitError> {
+    let unknowns = Unknowns::new(design, terms, options.unknowns.clone());
     let chain = unknowns.of_chain();
     let named: Vec<usize> = options.hold.names.iter().map(|name| name.index()).collect();
     if let Some(&name) = options.hold.names.iter().find(|name| name.index() >= chain.len()) {

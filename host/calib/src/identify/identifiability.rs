@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use ballbar::{Chain, Measurement, Pairing, ParameterUnit, Vector3};
+use ballbar::{Chain, JointTerms, Measurement, Pairing, ParameterUnit, Vector3};
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,9 +10,9 @@ use rand_chacha::ChaCha8Rng;
 use super::observation::Observation;
 use super::pivoting::PivotedColumns;
 use super::spectrum::{RANK_THRESHOLD, Spectrum, column_scales, is_zero_column};
-use crate::model::JointLimits;
+use crate::model::{Dataset, JointLimits, PoseRow, Robot};
 use crate::units::ScreenUnit;
-use crate::unknowns::{ChainBlock, Unknown};
+use crate::unknowns::{ChainBlock, Unknown, Unknowns};
 
 /// What the poses say of one unknown.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,8 +131,17 @@ impl Identifiability {
     /// Judges all parameters of `chain` by the weighted Jacobian at its present values. The subset is chosen around the
     /// parameters at the indices `held`, which are not free whatever the poses say.
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], held: &[usize]) -> Self {
-        let block = ChainBlock::new(chain.clone());
+        let block = ChainBlock::new(chain.clone(), JointTerms::none());
         Self::of(&block, &block.unknowns(), &Observation::new(chain, measurements), limits, held)
+    }
+
+    /// Judges all parameters of a robot, whose joints may have terms, by poses; as [`Identifiability::new`].
+    pub fn of_robot(robot: &Robot, dataset: &Dataset) -> Self {
+        let unknowns = Unknowns::new(&robot.chain, &robot.terms, Vec::new());
+        let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
+        // No parameter has a tolerance that a deviation would be weighed against.
+        let observation = Observation::of(&unknowns, &unknowns.start(), &rows, 1.0);
+        Self::of(unknowns.of_chain(), unknowns.list(), &observation, &robot.limits, &[])
     }
 
     /// Judges all unknowns, those of a chain and others behind them, by an observation of them all.
@@ -267,7 +276,7 @@ fn reference_jacobian(chain: &Chain<f64>, limits: &[JointLimits]) -> DMatrix<f64
             let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
             let pairing = Pairing { chuck_base_m: chucks[i % 3], sphere_tool_m: spheres[i / 3 % 3] };
             let q = chain.joint_vector(&q).ok()?;
-            Some(Measurement { pairing, q, length_m: 0.0, weight: 1.0 })
+            Some(Measurement::new(pairing, q, 0.0))
         })
         .collect();
     Observation::new(chain, &measurements).jacobian

@@ -1,6 +1,6 @@
 //! Residuals of a set of poses: in all, by pairing, and those that stand out.
 
-use ballbar::{Chain, Kinematics};
+use ballbar::Kinematics;
 
 use super::residual::{Residual, ResidualSummary, median};
 use super::trend::correlation_of_neighbours;
@@ -16,10 +16,13 @@ pub struct PairingResiduals {
     pub summary: ResidualSummary,
 }
 
-/// Residuals of all rows, in their order.
-pub fn residuals(chain: &Chain<f64>, dataset: &Dataset) -> Vec<Residual> {
-    let kinematics = Kinematics::new(chain);
-    let of = |row: &PoseRow| Residual { value_m: kinematics.residual(&row.measurement), weight: row.measurement.weight };
+/// Residuals of all rows, in their order, by kinematics that may have joint terms.
+pub fn residuals(kinematics: &Kinematics<f64>, dataset: &Dataset) -> Vec<Residual> {
+    let of = |row: &PoseRow| {
+        let measurement = &row.measurement;
+        let computed_m = kinematics.configuration(&measurement.q, row.approach).length(&measurement.pairing);
+        Residual { value_m: measurement.length_m - computed_m, weight: measurement.weight }
+    };
     dataset.rows.iter().map(of).collect()
 }
 

@@ -72,8 +72,7 @@ impl InverseKinematics {
 
     /// Prepares a robot with other limits than its own, one entry a joint, radians or metres.
     pub fn within(robot: &Robot, limits: Vec<JointLimits>) -> Self {
-        let skeleton = Skeleton::new(&robot.chain);
-        Self { closed: Opw::recognise(&skeleton), limits, skeleton }
+        Self { closed: Opw::recognise(&Skeleton::new(&robot.chain)), limits, skeleton: Skeleton::of(robot) }
     }
 
     /// Whether branches come from a closed form and are therefore all.
@@ -89,6 +88,11 @@ impl InverseKinematics {
     /// Joint vectors that bring the tool to a pose: all of them in closed form, otherwise those that `effort` finds.
     pub fn branches(&self, base_from_tool: &Pose<f64>, effort: Thoroughness, rng: &mut ChaCha8Rng) -> Branches {
         match &self.closed {
+            // Of an arm without terms exactly; from there it is a few steps to one with them.
+            Some(closed) if self.skeleton.has_terms() => {
+                let rigid = closed.solve(base_from_tool);
+                self.sorted(rigid.iter().filter_map(|start| self.reach(start, base_from_tool)).collect())
+            }
             Some(closed) => self.sorted(closed.solve(base_from_tool)),
             None => self.numeric_branches(base_from_tool, effort, rng),
         }

@@ -16,11 +16,11 @@ mod returning;
 
 use std::f64::consts::{PI, TAU};
 
-use ballbar::{Chain, Joint, JointKind, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Pose, Vector3};
+use ballbar::{Chain, Joint, JointKind, JointTerms, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Pose, Vector3};
 use nalgebra::DMatrix;
 
 use self::returning::UserFrames;
-use super::frames::{compose, from_link, link_angles, link_angles_about};
+use super::frames::{compose, from_link, inverse, link_angles, link_angles_about};
 use super::skeleton::Axis;
 
 /// A robot in canonical frames, and the way back to the frames it was written in.
@@ -68,6 +68,18 @@ impl CanonicalFrames {
     /// The same robot in canonical frames: the same pose at all encoder outputs, to rounding.
     pub fn chain(&self) -> &Chain<f64> {
         &self.canonical
+    }
+
+    /// Joint terms as they are in canonical frames: the masses' centres seen from there. Coefficients are of encoder outputs and loads, which
+    /// have no frame, and so has the payload, which is in the tool's.
+    pub fn terms(&self, terms: &JointTerms<f64>) -> JointTerms<f64> {
+        let mut canonical = *terms;
+        let (user, own) = (AtZero::of(self.user.chain()), AtZero::of(&self.canonical));
+        for ((body, user), own) in canonical.masses.links.iter_mut().zip(user.behind_joints()).zip(own.behind_joints()) {
+            let own_from_user = compose(&inverse(own), user);
+            body.center_m = own_from_user.rotation * body.center_m + own_from_user.translation_m;
+        }
+        canonical
     }
 
     /// The same with lengths in whole nanometres and angles in whole 2⁻³³ of a turn (0.7 nrad): the same bits however the robot is written,
@@ -141,13 +153,15 @@ impl CanonicalFrames {
 /// Poses of the joints' frames, before each joint's motion, and behind them that of the tool, at encoders zero: base frame.
 pub(super) struct AtZero {
     frames: Vec<Pose<f64>>,
+    /// The same behind each joint's motion: they move with it.
+    behind: Vec<Pose<f64>>,
     pub(super) base_from_tool: Pose<f64>,
 }
 
 impl AtZero {
     pub(super) fn of(chain: &Chain<f64>) -> Self {
         let mut base_from_last = from_link(Vector3::zeros(), [0.0; 3]);
-        let mut frames = Vec::new();
+        let (mut frames, mut behind) = (Vec::new(), Vec::new());
         for i in 0..=chain.joints() {
             if let Some(link) = chain.link(i) {
                 let angles = [link.alpha_rad, link.beta_rad, link.gamma_rad];
@@ -156,9 +170,10 @@ impl AtZero {
             if let Some(joint) = chain.joint(i) {
                 frames.push(base_from_last);
                 base_from_last = compose(&base_from_last, &joint_at_zero(joint.kind, joint.offset));
+                behind.push(base_from_last);
             }
         }
-        Self { frames, base_from_tool: base_from_last }
+        Self { frames, behind, base_from_tool: base_from_last }
     }
 
     /// The joints' axes through the origins that the chain gives them.
@@ -171,6 +186,10 @@ impl AtZero {
             scale: joint.scale,
         };
         joints.map(axis).collect()
+    }
+
+    fn behind_joints(&self) -> &[Pose<f64>] {
+        &self.behind
     }
 
     fn direction(&self, joint: usize) -> Vector3<f64> {

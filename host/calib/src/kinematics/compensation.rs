@@ -150,7 +150,7 @@ impl Compensator {
         Ok(Self {
             calibrated: InverseKinematics::within(calibrated, limits.clone()),
             nominal: InverseKinematics::within(nominal, limits.clone()),
-            nominal_forward: Kinematics::new(&nominal.chain),
+            nominal_forward: nominal.kinematics(),
             kinds,
             limits,
         })

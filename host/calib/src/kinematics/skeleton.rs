@@ -1,9 +1,10 @@
 //! Axes and links of a robot at one joint vector, whatever frames its file is written in.
 
-use ballbar::{Chain, Joint, JointKind, JointVector, MAX_JOINTS, Matrix3, Pose, Vector3};
+use ballbar::{Approach, Chain, Joint, JointKind, JointTerms, JointVector, Kinematics, MAX_JOINTS, Matrix3, Pose, Vector3};
 
-use super::canonical::canonical;
+use super::canonical::CanonicalFrames;
 use super::frames::from_link;
+use crate::model::Robot;
 
 /// A robot made ready for questions about its links: in canonical frames ([`super::CanonicalFrames`]), so that nothing here depends on
 /// where along its axis a frame was put.
@@ -12,6 +13,8 @@ pub struct Skeleton {
     chain: Chain<f64>,
     links: Vec<LinkTransform>,
     encoders: Vec<Joint<f64>>,
+    /// Of joints that have any, with what their loads are computed by.
+    terms: Option<Box<(JointTerms<f64>, Kinematics<f64>)>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +100,11 @@ impl Posture {
 impl Skeleton {
     /// Prepares a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
-        let chain = canonical(chain);
+        Self::of_canonical(CanonicalFrames::new(chain).chain())
+    }
+
+    fn of_canonical(chain: &Chain<f64>) -> Self {
+        let chain = chain.clone();
         let link = |i: usize| {
             let link = chain.link(i)?;
             let Pose { rotation, translation_m } = from_link(link.translation_m, [link.alpha_rad, link.beta_rad, link.gamma_rad]);
@@ -107,13 +114,33 @@ impl Skeleton {
         Self {
             links: (0..=chain.joints()).filter_map(link).collect(),
             encoders: (0..chain.joints()).filter_map(|i| chain.joint(i)).collect(),
+            terms: None,
             chain,
         }
+    }
+
+    /// Prepares a robot: its chain, with the terms of its joints. Of backlash the middle is taken.
+    pub fn of(robot: &Robot) -> Self {
+        let frames = CanonicalFrames::new(&robot.chain);
+        let of_joints = || Box::new((frames.terms(&robot.terms), Kinematics::new(frames.chain())));
+        Self { terms: (!robot.terms.are_zero()).then(of_joints), ..Self::of_canonical(frames.chain()) }
     }
 
     /// The robot in canonical frames.
     pub fn chain(&self) -> &Chain<f64> {
         &self.chain
+    }
+
+    /// Whether the joints' angles are more than offset and scale make them.
+    pub fn has_terms(&self) -> bool {
+        self.terms.is_some()
+    }
+
+    fn displacements(&self, q: &JointVector<f64>) -> JointVector<f64> {
+        self.terms.as_ref().map_or(JointVector::zero(), |of_joints| {
+            let (terms, rigid) = &**of_joints;
+            terms.displacements(q, &terms.loads(rigid, q), Approach::UNKNOWN)
+        })
     }
 
     /// Number of joints.
@@ -145,6 +172,7 @@ impl Skeleton {
             ends_m: [Vector3::zeros(); MAX_JOINTS + 1],
             base_from_tool: Pose { rotation: Matrix3::identity(), translation_m: Vector3::zeros() },
         };
+        let displacements = self.displacements(q);
         let (mut rotation, mut origin_m) = (Matrix3::identity(), Vector3::zeros());
         let mut start_height_m = 0.0;
         for (i, link) in self.links.iter().enumerate() {
@@ -157,7 +185,7 @@ impl Skeleton {
             start_height_m = link.end_height_m;
             let Some(encoder) = self.encoders.get(i) else { continue };
             posture.axes[i] = Axis { kind: encoder.kind, point_m: origin_m, direction, scale: encoder.scale };
-            let theta = encoder.offset + encoder.scale * q.as_array()[i];
+            let theta = encoder.offset + encoder.scale * q.as_array()[i] + displacements.as_array()[i];
             match encoder.kind {
                 JointKind::Revolute => turn_about_z(&mut rotation, theta),
                 JointKind::Prismatic => origin_m += direction * theta,

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::fmt;
 
-use ballbar::{JointVector, Measurement};
+use ballbar::{Approach, JointVector, Measurement};
 use thiserror::Error;
 
 use super::rig::{PairingId, Rig};
@@ -17,6 +17,9 @@ pub struct PoseRow {
     pub pairing: PairingId,
     /// What was measured, SI units; the weight has mean 1 over the dataset.
     pub measurement: Measurement<f64>,
+    /// From which sides the joints came there, where it is known. Backlash depends on it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub approach: Approach,
     /// Standard deviation of the length, metres, where it is known.
     pub sigma_m: Option<f64>,
     /// The part of the measurements that the row belongs to, where they have parts.
@@ -83,13 +86,25 @@ impl PoseRow {
         if !(length_m.is_finite() && length_m > 0.0) {
             return Err(PoseError::Length { length_m });
         }
-        let measurement = Measurement { pairing: rig.pairing(pairing), q, length_m, weight: 1.0 };
+        let measurement = Measurement::new(rig.pairing(pairing), q, length_m);
         Ok(Self::of(pairing, measurement))
     }
 
     /// A measurement with nothing else known of it.
     pub(crate) fn of(pairing: PairingId, measurement: Measurement<f64>) -> Self {
-        Self { pairing, measurement, sigma_m: None, set: None, t_s: None, bar_m: None, motion: None, file: 0, line: 0, number: 0 }
+        Self {
+            pairing,
+            measurement,
+            approach: Approach::UNKNOWN,
+            sigma_m: None,
+            set: None,
+            t_s: None,
+            bar_m: None,
+            motion: None,
+            file: 0,
+            line: 0,
+            number: 0,
+        }
     }
 }
 

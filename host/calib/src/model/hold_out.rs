@@ -116,7 +116,8 @@ mod tests {
             let pairing = PairingId { chuck, sphere: 0 };
             PoseRow {
                 pairing,
-                measurement: Measurement { pairing: rig.pairing(pairing), q: JointVector::zero(), length_m, weight: 1.0 },
+                measurement: Measurement::new(rig.pairing(pairing), JointVector::zero(), length_m),
+                approach: ballbar::Approach::UNKNOWN,
                 sigma_m: None,
                 set: None,
                 t_s: None,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use ballbar::{Chain, Coupling, Encoder};
+use ballbar::{Chain, Coupling, Encoder, JointTerms, Kinematics, TermsError};
 use thiserror::Error;
 
 use super::calibration::{Calibration, CalibrationVerdict};
@@ -18,6 +18,8 @@ pub struct Robot {
     pub source: String,
     /// Links, joints and their parameters, SI units.
     pub chain: Chain<f64>,
+    /// What the joints' angles have beside offset and scale, and the masses that they bear; none of a design that says nothing.
+    pub terms: JointTerms<f64>,
     /// Limits of each joint's encoder output, radians or metres.
     pub limits: Vec<JointLimits>,
     /// What is known of each joint's encoder.
@@ -61,6 +63,9 @@ pub enum RobotError {
         /// What was given, radians or metres.
         limits: JointLimits,
     },
+    /// Terms that no chain of these joints has.
+    #[error(transparent)]
+    Terms(#[from] TermsError),
     /// What is known of encoders is not of these joints.
     #[error("encoders of {found} joints, expected {expected}")]
     EncoderCount {
@@ -80,7 +85,7 @@ impl Robot {
     pub fn new(name: impl Into<String>, chain: Chain<f64>, limits: Vec<JointLimits>) -> Result<Self, RobotError> {
         let name = name.into();
         let encoders = vec![EncoderFacts::UNKNOWN; chain.joints()];
-        Self { source: name.clone(), name, chain, limits, encoders, calibration: None }.checked()
+        Self { source: name.clone(), name, chain, terms: JointTerms::none(), limits, encoders, calibration: None }.checked()
     }
 
     /// What [`Robot::new`] promises of a robot, whoever has put it together.
@@ -92,10 +97,16 @@ impl Robot {
         if self.encoders.len() != expected {
             return Err(RobotError::EncoderCount { found: self.encoders.len(), expected });
         }
+        self.terms.check(self.chain.joint_kinds())?;
         match self.limits.iter().position(|limits| !limits.are_a_range()) {
             Some(i) => Err(RobotError::Limits { joint: i + 1, limits: self.limits[i] }),
             None => Ok(self),
         }
+    }
+
+    /// Its chain with the terms of its joints, ready to compute with.
+    pub fn kinematics(&self) -> Kinematics<f64> {
+        Kinematics::with_terms(&self.chain, &self.terms)
     }
 
     /// What the fit behind this robot was found to be; `None` for a design, and for a file that does not say.

@@ -1,6 +1,6 @@
 //! What is read of stored robots, rigs and datasets, before it is found to be one.
 
-use ballbar::Chain;
+use ballbar::{Chain, JointTerms};
 use serde::Deserialize;
 use thiserror::Error;
 
@@ -13,6 +13,8 @@ pub(super) struct RobotParts {
     name: String,
     source: String,
     chain: Chain<f64>,
+    #[serde(default = "JointTerms::none")]
+    terms: JointTerms<f64>,
     limits: Vec<JointLimits>,
     encoders: Vec<EncoderFacts>,
     calibration: Option<Calibration>,
@@ -22,8 +24,8 @@ impl TryFrom<RobotParts> for Robot {
     type Error = RobotError;
 
     fn try_from(parts: RobotParts) -> Result<Self, RobotError> {
-        let RobotParts { name, source, chain, limits, encoders, calibration } = parts;
-        Self { name, source, chain, limits, encoders, calibration }.checked()
+        let RobotParts { name, source, chain, terms, limits, encoders, calibration } = parts;
+        Self { name, source, chain, terms, limits, encoders, calibration }.checked()
     }
 }
 

@@ -109,7 +109,8 @@ impl<'a> Cell<'a> {
     /// # Errors
     /// [`FixturesOverlap`] when the rig cannot be as it is described.
     pub fn new(robot: &'a Robot, rig: &'a Rig, travel_m: f64, margins: Margins, pace: Pace) -> Result<Self, FixturesOverlap> {
-        let planned = Robot { chain: CanonicalFrames::new(&robot.chain).rounded_chain(), ..robot.clone() };
+        let frames = CanonicalFrames::new(&robot.chain);
+        let planned = Robot { chain: frames.rounded_chain(), terms: frames.terms(&robot.terms), ..robot.clone() };
         let (scene, gaps) = Scene::new(&planned, rig, margins.clearance_m);
         let inverse = InverseKinematics::new(&planned);
         let skeleton = inverse.skeleton();
@@ -136,7 +137,7 @@ impl<'a> Cell<'a> {
             travel_m,
             margins,
             pace,
-            kinematics: Kinematics::new(chain),
+            kinematics: planned.kinematics(),
             scales: parameters.clone().map(scale).collect(),
             deviations: parameters.map(deviation).collect(),
             arm_m: behind_m.max(f64::MIN_POSITIVE),
@@ -206,7 +207,7 @@ impl<'a> Cell<'a> {
         let mut swept = LengthRows::default();
         let mut rows = Vec::with_capacity(all_q.len());
         for block in all_q.chunks(LANES) {
-            let measurement = |&q: &JointVector<f64>| Measurement { pairing: *pairing, q, length_m: 0.0, weight: 1.0 };
+            let measurement = |&q: &JointVector<f64>| Measurement::new(*pairing, q, 0.0);
             let measurements: heapless::Vec<_, LANES> = block.iter().map(measurement).collect();
             swept.compute(&self.kinematics, &measurements);
             let row =

@@ -77,7 +77,7 @@ pub fn check(cell: &Cell<'_>, rows: &[PlanRow], step: f64, plausible_robots: usi
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for _ in 0..plausible_robots {
-        let kinematics = Kinematics::new(&cell.plausible_robot(&mut rng));
+        let kinematics = Kinematics::with_terms(&cell.plausible_robot(&mut rng), &cell.robot.terms);
         for row in rows.iter().filter(|row| row.bar.is_some()) {
             let length_m = kinematics.length(&row.q, &cell.rig.pairing(row.pairing));
             found.plausible_travel_m = found.plausible_travel_m.min(cell.travel_m / 2.0 - (length_m - row.bar_m).abs());

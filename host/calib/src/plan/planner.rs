@@ -175,12 +175,7 @@ impl Plan {
     pub fn as_dataset(&self, rig: &Rig) -> Dataset {
         let measured = self.rows.iter().filter(|row| row.kind == RowKind::Measure);
         let pose = |(i, row): (usize, &PlanRow)| {
-            let measurement = Measurement {
-                pairing: rig.pairing(row.pairing),
-                q: row.q,
-                length_m: row.bar.map_or(row.bar_m, |bar| bar.length_m),
-                weight: 1.0,
-            };
+            let measurement = Measurement::new(rig.pairing(row.pairing), row.q, row.bar.map_or(row.bar_m, |bar| bar.length_m));
             let number = i + 1;
             PoseRow { bar_m: Some(row.bar_m), line: number, number, ..PoseRow::of(row.pairing, measurement) }
         };
@@ -317,7 +312,7 @@ fn choose(
 }
 
 fn measurement(shell: &Shell, q: &JointVector<f64>) -> Measurement<f64> {
-    Measurement { pairing: shell.pairing, q: *q, length_m: shell.bar_m, weight: 1.0 }
+    Measurement::new(shell.pairing, *q, shell.bar_m)
 }
 
 /// Rows in order, with the moves between shells, and what is to be said of them.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use ballbar::{JointVector, Kinematics, Vector3};
+use ballbar::{JointVector, Vector3};
 
 use crate::model::{PairingId, PoseError, PoseRow, Rig, Robot};
 
@@ -96,7 +96,7 @@ impl PlanRow {
     ) -> Result<Self, PoseError> {
         let row = Self::without_bar(rig, pairing, bar_m, q)?;
         let ends = rig.pairing(pairing);
-        let sphere_base_m = Kinematics::new(&robot.chain).point_in_base(&q, &ends.sphere_tool_m);
+        let sphere_base_m = robot.kinematics().point_in_base(&q, &ends.sphere_tool_m);
         Ok(Self { kind, bar: Some(BarAt::along(&(sphere_base_m - ends.chuck_base_m))), ..row })
     }
 

@@ -39,7 +39,7 @@ const POSTURES: usize = 400;
 impl Scene {
     /// Sets the scene, and tells what gaps were seen while it was set; `clearance_m` is what has to stay between any two things.
     pub(super) fn new(robot: &Robot, rig: &Rig, clearance_m: f64) -> (Self, Vec<Gap>) {
-        let skeleton = Skeleton::new(&robot.chain);
+        let skeleton = Skeleton::of(robot);
         let solids = rig.solids;
         let home = skeleton.at(&JointVector::zero());
         let positions = |points: &[NamedPoint]| -> Vec<Vector3<f64>> { points.iter().map(|point| point.position_m).collect() };

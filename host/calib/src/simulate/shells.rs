@@ -97,8 +97,8 @@ impl Shells<'_> {
     /// # Panics
     /// When a pairing is none of the rig's.
     pub fn simulate(&self, mut on_pose: impl FnMut()) -> Result<Vec<ShellPose>, ShellError> {
-        let planned = Skeleton::new(&self.planned_with.chain);
-        let truth = Kinematics::new(&self.truth.chain);
+        let planned = Skeleton::of(self.planned_with);
+        let truth = self.truth.kinematics();
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         // Noise has a stream of its own: its size changes no pose, as long as it keeps the length within the bar's travel.
         let mut noise_rng = ChaCha8Rng::seed_from_u64(self.seed);
@@ -157,7 +157,7 @@ impl Shells<'_> {
             row: PoseRow {
                 set: Some(tidy(mm_from_m(self.bar_m)).to_string()),
                 bar_m: Some(self.bar_m),
-                ..PoseRow::of(id, ballbar::Measurement { pairing, q, length_m, weight: 1.0 })
+                ..PoseRow::of(id, ballbar::Measurement::new(pairing, q, length_m))
             },
             latitude_rad,
             longitude_rad,

@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
-use ballbar::{Chain, PARAMETERS_OF_LAST_LINK, Parameter, ParameterUnit};
+use ballbar::{Chain, JointTerms, JointVector, Kinematics, PARAMETERS_OF_LAST_LINK, Parameter, ParameterUnit};
 
 use super::Unknown;
+use crate::model::PoseRow;
 
-/// How far a design value may plausibly be off, SI: 5 mm, 0.5°, 0.5 %; a signal's latency by 5 ms. A parameter whose standard deviation from
+/// How far a design value may plausibly be off, SI: 5 mm, 0.5°, 0.5 %; a signal's latency by 5 ms, a joint's compliance by
+/// 1e-4 rad/Nm or 1e-5 m/N. A parameter whose standard deviation from
 /// some poses would exceed this is better left at its design value, which tells more than the poses do.
 pub fn plausible_error(unit: ParameterUnit) -> f64 {
     match unit {
@@ -14,21 +16,59 @@ pub fn plausible_error(unit: ParameterUnit) -> f64 {
         ParameterUnit::Radian => 0.5_f64.to_radians(),
         ParameterUnit::One => 5e-3,
         ParameterUnit::Second => 5e-3,
+        ParameterUnit::RadianPerNewtonMetre => 1e-4,
+        ParameterUnit::MetrePerNewton => 1e-5,
     }
 }
 
-/// The parameters of a design, in parameter order. Unlike other blocks it does not correct measurements: it is what they are compared with, and
-/// the sweep down the chain gives its columns.
+/// The parameters of a design, in parameter order, with the terms that its joints are known to have. Other blocks correct measurements: this
+/// is what they are compared with, and the sweep down the chain gives its columns.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
 pub struct ChainBlock {
     design: Chain<f64>,
+    terms: JointTerms<f64>,
+    rigid: Kinematics<f64>,
+}
+
+/// What a block is made from.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Written {
+    design: Chain<f64>,
+    #[serde(default = "JointTerms::none")]
+    terms: JointTerms<f64>,
+}
+
+#[cfg(feature = "serde")]
+impl From<Written> for ChainBlock {
+    fn from(Written { design, terms }: Written) -> Self {
+        Self::new(design, terms)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<ChainBlock> for Written {
+    fn from(ChainBlock { design, terms, .. }: ChainBlock) -> Self {
+        Self { design, terms }
+    }
 }
 
 impl ChainBlock {
-    /// The parameters of a design.
-    pub fn new(design: Chain<f64>) -> Self {
-        Self { design }
+    /// The parameters of a design whose joints have these terms.
+    pub fn new(design: Chain<f64>, terms: JointTerms<f64>) -> Self {
+        Self { rigid: Kinematics::new(&design), design, terms }
+    }
+
+    /// What gravity does to the design's joints, Nm or N.
+    pub(super) fn loads(&self, q: &JointVector<f64>) -> JointVector<f64> {
+        self.rigid.gravity_loads(&self.terms.masses, q)
+    }
+
+    /// What the known terms add to the joints' angles where a row was measured, radians or metres.
+    pub(super) fn displacements(&self, row: &PoseRow) -> JointVector<f64> {
+        let q = &row.measurement.q;
+        self.terms.displacements(q, &self.terms.loads(&self.rigid, q), row.approach)
     }
 
     /// The design.

@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use super::{BarZero, Block, Gain, Latency, RigBlock, RodZeros, SetOffsets};
-use crate::model::{Dataset, Rig};
+use super::{BarZero, Block, Gain, Latency, RigBlock, RodZeros, SetOffsets, TermsBlock};
+use crate::model::{Dataset, Rig, Robot};
 
 /// A kind of unknowns that a fit may be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -21,13 +21,30 @@ pub enum Kind {
     Rig,
     /// By how much the lengths of each set are too long.
     Sets,
+    /// How far joints yield to gravity.
+    Compliance,
+    /// How far encoders' discs are off their axes.
+    Eccentricity,
+    /// By how much joints lag behind their encoders.
+    Backlash,
 }
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 6] = [Self::BarZero, Self::RodZeros, Self::BarGain, Self::Latency, Self::Rig, Self::Sets];
+    pub const ALL: [Self; 9] = [
+        Self::BarZero,
+        Self::RodZeros,
+        Self::BarGain,
+        Self::Latency,
+        Self::Rig,
+        Self::Sets,
+        Self::Compliance,
+        Self::Eccentricity,
+        Self::Backlash,
+    ];
 
-    /// What it is called: `bar-zero`, `rod-zeros`, `bar-gain`, `latency`, `rig`, `sets`.
+    /// What it is called: `bar-zero`, `rod-zeros`, `bar-gain`, `latency`, `rig`, `sets`, `compliance`,
+    /// `eccentricity`, `backlash`.
     pub fn name(self) -> &'static str {
         match self {
             Self::BarZero => "bar-zero",
@@ -36,6 +53,9 @@ impl Kind {
             Self::Latency => "latency",
             Self::Rig => "rig",
             Self::Sets => "sets",
+            Self::Compliance => "compliance",
+            Self::Eccentricity => "eccentricity",
+            Self::Backlash => "backlash",
         }
     }
 
@@ -44,11 +64,11 @@ impl Kind {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// The unknowns of this kind that a dataset has.
+    /// The unknowns of this kind that a robot, a rig and a dataset have.
     ///
     /// # Errors
     /// [`UnknownError`] when it has none.
-    pub fn block(self, rig: &Rig, dataset: &Dataset) -> Result<AnyBlock, UnknownError> {
+    pub fn block(self, robot: &Robot, rig: &Rig, dataset: &Dataset) -> Result<AnyBlock, UnknownError> {
         Ok(match self {
             Self::BarZero => AnyBlock::BarZero(BarZero),
             Self::RodZeros => AnyBlock::RodZeros(RodZeros::new(rig, dataset)),
@@ -56,12 +76,15 @@ impl Kind {
             Self::Latency => AnyBlock::Latency(Latency::new(dataset)?),
             Self::Rig => AnyBlock::Rig(RigBlock::new(rig, dataset)?),
             Self::Sets => AnyBlock::Sets(SetOffsets::new(dataset)?),
+            Self::Compliance => AnyBlock::Terms(Box::new(TermsBlock::compliance(robot)?)),
+            Self::Eccentricity => AnyBlock::Terms(Box::new(TermsBlock::eccentricity(robot)?)),
+            Self::Backlash => AnyBlock::Terms(Box::new(TermsBlock::backlash(robot, dataset)?)),
         })
     }
 }
 
 /// Unknowns of one of the kinds.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum AnyBlock {
     /// [`Kind::BarZero`].
@@ -76,6 +99,8 @@ pub enum AnyBlock {
     Rig(RigBlock),
     /// [`Kind::Sets`].
     Sets(SetOffsets),
+    /// [`Kind::Compliance`], [`Kind::Eccentricity`] or [`Kind::Backlash`].
+    Terms(Box<TermsBlock>),
 }
 
 impl AnyBlock {
@@ -87,6 +112,7 @@ impl AnyBlock {
             Self::Latency(block) => block,
             Self::Rig(block) => block,
             Self::Sets(block) => block,
+            Self::Terms(block) => block.as_ref(),
         }
     }
 }
@@ -107,4 +133,13 @@ pub enum UnknownError {
     /// No row belongs to a set.
     #[error("no row names a set")]
     NoSets,
+    /// No joint bears a mass.
+    #[error("no mass is known that a joint bears")]
+    NoMasses,
+    /// No joint has a disc that could be off its axis.
+    #[error("all joints are prismatic")]
+    NoDiscs,
+    /// No joint is known to have come to its poses from both sides.
+    #[error("no joint is known to have come from both sides")]
+    NoApproach,
 }

@@ -15,14 +15,16 @@ mod chain;
 mod list;
 mod rig;
 mod sets;
+mod terms;
 
-use ballbar::{Chain, Kinematics, LANES, Lanes, LengthRows, Measurement, ParameterUnit, Rows};
+use ballbar::{Chain, JointTerms, Kinematics, LANES, Lanes, LengthRows, Measurement, ParameterUnit, Rows};
 
 pub use bar::{BarZero, Gain, Latency, RodZeros};
 pub use chain::{ChainBlock, plausible_error};
 pub use list::{AnyBlock, Kind, UnknownError};
 pub use rig::RigBlock;
 pub use sets::SetOffsets;
+pub use terms::TermsBlock;
 
 use crate::model::{PoseRow, Rig};
 
@@ -67,9 +69,9 @@ pub struct Unknowns {
 }
 
 impl Unknowns {
-    /// The parameters of a design, and the unknowns of other blocks.
-    pub fn new(design: &Chain<f64>, others: Vec<AnyBlock>) -> Self {
-        let chain = ChainBlock::new(design.clone());
+    /// The parameters of a design whose joints have these terms, and the unknowns of other blocks.
+    pub fn new(design: &Chain<f64>, terms: &JointTerms<f64>, others: Vec<AnyBlock>) -> Self {
+        let chain = ChainBlock::new(design.clone(), *terms);
         let of_others: Vec<Vec<Unknown>> = others.iter().map(|block| block.as_block().unknowns()).collect();
         let sizes = of_others.iter().map(Vec::len).collect();
         let list = chain.unknowns().into_iter().chain(of_others.into_iter().flatten()).collect();
@@ -99,6 +101,7 @@ impl Unknowns {
     /// What a row's measurement is at these values.
     pub fn corrected(&self, values: &[f64], row: &PoseRow) -> Measurement<f64> {
         let mut measurement = row.measurement;
+        measurement.joint_terms = self.chain.displacements(row);
         for (block, own) in self.other_blocks(values) {
             block.correct(own, row, &mut measurement);
         }
@@ -118,6 +121,17 @@ impl Unknowns {
     /// Whether something is believed of an unknown as firmly as if it had been measured.
     pub fn have_priors(&self) -> bool {
         self.list.iter().any(|unknown| unknown.tolerance.is_some())
+    }
+
+    /// Joint terms with what was found beside them at these values.
+    pub fn terms(&self, values: &[f64], terms: &JointTerms<f64>) -> JointTerms<f64> {
+        let mut found = *terms;
+        for (block, own) in self.others.iter().zip(self.other_blocks(values).map(|(_, own)| own)) {
+            if let AnyBlock::Terms(block) = block {
+                block.add_to(own, &mut found);
+            }
+        }
+        found
     }
 
     /// The rig at these values.

@@ -38,6 +38,11 @@ impl UserFrames {
         }
     }
 
+    /// The chain as the user has written it.
+    pub(super) fn chain(&self) -> &Chain<f64> {
+        &self.chain
+    }
+
     /// The user's own chain with the differences between two others, angles less whole turns. What both have alike, but for rounding, keeps
     /// the user's digits.
     pub(super) fn moved_from(&self, from: &Chain<f64>, to: &Chain<f64>) -> Chain<f64> {
