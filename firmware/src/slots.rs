@@ -74,14 +74,10 @@ impl Slots {
 
     /// Reads both slots; returns the newest whole set as well.
     pub fn load(flash: &mut impl ParameterFlash) -> (Self, Option<ParameterSet>) {
-        let [first, second] = [0, 1].map(|slot| read_slot(flash, slot).unwrap_or((SlotState::Damaged, None)));
-        let slots = Self { states: [first.0, second.0] };
-        let stored = match slots.newest() {
-            Some(0) => first.1,
-            Some(_) => second.1,
-            None => None,
-        };
-        (slots, stored.map(|stored| stored.set))
+        let slots = Self { states: [0, 1].map(|slot| state_of(flash, slot)) };
+        // Read once more, so that never two sets lie on the stack.
+        let newest = slots.newest().and_then(|slot| read_slot(flash, slot).ok()?.1);
+        (slots, newest.map(|stored| stored.set))
     }
 
     /// The two places.
@@ -222,6 +218,12 @@ fn write_image<F: ParameterFlash>(flash: &mut F, slot: usize, image: &Image, len
     flash.erase(start, start + F::SLOT_BYTES).map_err(|_| ())?;
     flash.write(start + header as u32, &image[header..end]).map_err(|_| ())?;
     flash.write(start, &image[..header]).map_err(|_| ())
+}
+
+/// Not inlined, so that the set that is read with it leaves the stack.
+#[inline(never)]
+fn state_of(flash: &mut impl ParameterFlash, slot: usize) -> SlotState {
+    read_slot(flash, slot).map_or(SlotState::Damaged, |(state, _)| state)
 }
 
 /// A set in flash.
