@@ -9,6 +9,7 @@ use super::mistake::{Mistake, any_constant, conceivable};
 use super::plausibility::large_changes;
 use super::refusals::Refusal;
 use crate::identify::{Finding, Held, LmOptions, solve};
+use crate::kinematics::CanonicalFrames;
 use crate::units::{fixed, mm_from_m};
 
 /// What may be wrong. Its text is a whole sentence.
@@ -122,21 +123,25 @@ fn variance(values: &[f64]) -> f64 {
 
 /// Quick fits, all of the same parameters and rows: those that are independent in these poses, weak ones too. How weak they are was judged
 /// by the residuals of measurements that do not fit, and a fit without them would leave what is wrong with the design.
-struct Trial<'a> {
-    design: &'a Chain<f64>,
+struct Trial {
+    /// In canonical frames, as the fit was made, unless parameters of the user's frames were named.
+    design: Chain<f64>,
     free: FreeParameters,
     options: LmOptions,
 }
 
-impl<'a> Trial<'a> {
+impl Trial {
     /// A design is a good start: what has not come near in so many steps is not the right one.
     const STEPS: usize = 20;
 
-    fn new(evidence: &Evidence<'a>) -> Self {
+    fn new(evidence: &Evidence<'_>) -> Self {
         let parameters = &evidence.fit.parameters;
         let is_free = |index: usize| matches!(parameters[index].held, None | Some(Held::Finding(Finding::Weak { .. })));
         let free = FreeParameters::filtered(parameters.len(), is_free);
-        Self { design: &evidence.robot.chain, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
+        let chain = &evidence.robot.chain;
+        let are_named = parameters.iter().any(|parameter| matches!(parameter.held, Some(Held::ByName | Held::AsInPaper)));
+        let design = if are_named { chain.clone() } else { CanonicalFrames::new(chain).chain().clone() };
+        Self { design, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
     }
 
     /// The RMS residual of a fit, metres, and whether its parameters are a robot's; `None` where nothing can be fitted.
@@ -145,11 +150,11 @@ impl<'a> Trial<'a> {
         if rows.len() <= self.free.len() {
             return None;
         }
-        let fitted = solve(self.design, &rows, &self.free, &self.options).chain;
+        let fitted = solve(&self.design, &rows, &self.free, &self.options).chain;
         let kinematics = Kinematics::new(&fitted);
         let weight: f64 = rows.iter().map(|row| row.weight).sum();
         let squares: f64 = rows.iter().map(|row| row.weight * kinematics.residual(row).powi(2)).sum();
-        let is_plausible = large_changes(self.design, &fitted).iter().all(|change| !change.is_impossible);
+        let is_plausible = large_changes(&self.design, &fitted).iter().all(|change| !change.is_impossible);
         Some(((squares / weight).sqrt(), is_plausible)).filter(|(rms_m, _)| rms_m.is_finite())
     }
 
