@@ -157,7 +157,7 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
     let canonical = Robot { chain: frames.chain().clone(), ..robot.clone() };
     let fit = fit_in_own_frames(&canonical, dataset, options)?;
     let found = Identifiability::new(&robot.chain, &dataset.measurements(), &robot.limits, &[]);
-    Ok(in_user_frames(fit, robot, &frames, &found))
+    Ok(in_user_frames(fit, robot, dataset, &frames, &found))
 }
 
 fn fit_in_own_frames(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {

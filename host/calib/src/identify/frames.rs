@@ -10,16 +10,24 @@ use nalgebra::DMatrix;
 use super::fit::{Fit, FittedParameter};
 use super::hold::Held;
 use super::identifiability::{Finding, Identifiability};
+use super::residual::ResidualSummary;
+use super::residuals::residuals;
 use super::uncertainty::Uncertainty;
 use crate::kinematics::CanonicalFrames;
-use crate::model::Robot;
+use crate::model::{Dataset, Robot};
 
 /// A derivative that is rounding of frames half a kilometre away.
 const ROUNDING: f64 = 1e-7;
 
 /// The same fit with chain, parameters, findings and deviations in the frames of `robot`. A parameter that no free one moves is held, for the
 /// reason that `found` gives in these frames.
-pub(super) fn in_user_frames(mut fit: Fit, robot: &Robot, frames: &CanonicalFrames, found: &Identifiability) -> Fit {
+pub(super) fn in_user_frames(
+    mut fit: Fit,
+    robot: &Robot,
+    dataset: &Dataset,
+    frames: &CanonicalFrames,
+    found: &Identifiability,
+) -> Fit {
     let free: Vec<usize> = (0..fit.parameters.len()).filter(|&index| fit.parameters[index].held.is_none()).collect();
     let moves = frames.user_by_canonical(&fit.solution.chain).select_columns(&free);
     let is_moved = |row: usize| moves.row(row).amax() > ROUNDING;
@@ -27,6 +35,10 @@ pub(super) fn in_user_frames(mut fit: Fit, robot: &Robot, frames: &CanonicalFram
 
     fit.uncertainty = moved_uncertainty(fit.uncertainty, &moves.select_rows(&moved));
     fit.solution.chain = frames.in_user_frames(&fit.solution.chain);
+    // The same but for rounding; where a file's own lengths are met, nothing is left of them.
+    let [before, after] = [&robot.chain, &fit.solution.chain].map(|chain| residuals(chain, dataset));
+    (fit.initial, fit.fitted) = (ResidualSummary::new(&before), ResidualSummary::new(&after));
+    fit.residuals = after;
     let values = robot.chain.parameters().iter().zip(fit.solution.chain.parameters());
     fit.parameters = fit
         .parameters
