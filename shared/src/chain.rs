@@ -55,6 +55,11 @@ impl<S: Number> JointVector<S> {
         Self([S::zero(); MAX_JOINTS])
     }
 
+    /// Whether all values are zero.
+    pub fn are_zero(&self) -> bool {
+        self.0.iter().all(|value| *value == S::zero())
+    }
+
     /// The values; those beyond the chain's joints are zero.
     pub fn as_array(&self) -> &[S; MAX_JOINTS] {
         &self.0

@@ -40,23 +40,6 @@ impl<'a, S: Number> Configuration<'a, S> {
 
     /// As [`Kinematics::gradient`].
     pub fn gradient(&self, quantity: Quantity, pairing: &Pairing<S>, row: &mut Row<S>) -> Force<S> {
-        let bar_m = self.point_in_base(&pairing.sphere_tool_m) - pairing.chuck_base_m;
-        let (value_m, force_base) = match quantity {
-            Quantity::Length => {
-                let length_m = bar_m.dot(&bar_m).square_root();
-                (length_m, bar_m * length_m.inverse())
-            }
-            Quantity::X | Quantity::Y | Quantity::Z => {
-                let axis = quantity as usize;
-                (bar_m[axis], Vector3::ith(axis, S::one()))
-            }
-        };
-        // The force acts at the sphere. Along a bar its line passes through the chuck as well, which is the exact one of the two.
-        let at_m = match quantity {
-            Quantity::Length => pairing.chuck_base_m,
-            Quantity::X | Quantity::Y | Quantity::Z => bar_m + pairing.chuck_base_m,
-        };
-        let force_tool = self.kinematics.sweep_wrench(self.q, &self.motions, force_base, at_m.cross(&force_base), row);
-        Force { value_m, base: force_base, tool: force_tool }
+        self.kinematics.gradient_at(&self.motions, quantity, self.q, pairing, row)
     }
 }

@@ -141,7 +141,39 @@ impl<S: Number> Kinematics<S> {
     /// else it depends on is in the force that is returned.
     #[inline]
     pub fn gradient(&self, quantity: Quantity, q: &JointVector<S>, pairing: &Pairing<S>, row: &mut Row<S>) -> Force<S> {
-        self.configuration(q, Approach::UNKNOWN).gradient(quantity, pairing, row)
+        match self.terms {
+            None => self.gradient_at(&self.rigid_motions(q), quantity, q, pairing, row),
+            Some(_) => self.configuration(q, Approach::UNKNOWN).gradient(quantity, pairing, row),
+        }
+    }
+
+    /// The same where the joints do this.
+    pub(crate) fn gradient_at(
+        &self,
+        motions: &[Motion<S>; MAX_JOINTS],
+        quantity: Quantity,
+        q: &JointVector<S>,
+        pairing: &Pairing<S>,
+        row: &mut Row<S>,
+    ) -> Force<S> {
+        let bar_m = self.sweep_out(motions, &pairing.sphere_tool_m) - pairing.chuck_base_m;
+        let (value_m, force_base) = match quantity {
+            Quantity::Length => {
+                let length_m = bar_m.dot(&bar_m).square_root();
+                (length_m, bar_m * length_m.inverse())
+            }
+            Quantity::X | Quantity::Y | Quantity::Z => {
+                let axis = quantity as usize;
+                (bar_m[axis], Vector3::ith(axis, S::one()))
+            }
+        };
+        // The force acts at the sphere. Along a bar its line passes through the chuck as well, which is the exact one of the two.
+        let at_m = match quantity {
+            Quantity::Length => pairing.chuck_base_m,
+            Quantity::X | Quantity::Y | Quantity::Z => bar_m + pairing.chuck_base_m,
+        };
+        let force_tool = self.sweep_wrench(q, motions, force_base, at_m.cross(&force_base), row);
+        Force { value_m, base: force_base, tool: force_tool }
     }
 
     /// Position in the base frame of a point of the tool, metres, and the gradients of its three coordinates into `rows`.
@@ -156,18 +188,19 @@ impl<S: Number> Kinematics<S> {
 
     /// Residual `f = d_measured − d_computed`, metres, and the gradient of the computed length into `row`: one row of the equations.
     pub fn residual_row(&self, measurement: &Measurement<S>, row: &mut Row<S>) -> (S, Force<S>) {
-        let force = self.measured(measurement).gradient(Quantity::Length, &measurement.pairing, row);
-        (measurement.length_m - force.value_m, force)
+        let Measurement { q, joint_terms, pairing, length_m, .. } = measurement;
+        let force = if joint_terms.are_zero() {
+            self.gradient_at(&self.rigid_motions(q), Quantity::Length, q, pairing, row)
+        } else {
+            Configuration::displaced(self, q, joint_terms).gradient(Quantity::Length, pairing, row)
+        };
+        (*length_m - force.value_m, force)
     }
 
     /// Residual `f = d_measured − d_computed`, metres.
     pub fn residual(&self, measurement: &Measurement<S>) -> S {
-        measurement.length_m - self.measured(measurement).length(&measurement.pairing)
-    }
-
-    /// The chain where a length was measured. What the joints' terms add there is the measurement's to say.
-    fn measured<'a>(&'a self, measurement: &'a Measurement<S>) -> Configuration<'a, S> {
-        Configuration::displaced(self, &measurement.q, &measurement.joint_terms)
+        measurement.length_m
+            - Configuration::displaced(self, &measurement.q, &measurement.joint_terms).length(&measurement.pairing)
     }
 
     pub(crate) fn joints(&self) -> usize {
@@ -202,15 +235,23 @@ impl<S: Number> Kinematics<S> {
 
     /// What the joints do at `θ = offset + scale · q`.
     pub(crate) fn rigid_motions(&self, q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
-        self.displaced_motions(q, &JointVector::zero())
+        self.motions_of(&self.encoders, q)
     }
 
-    /// What the joints do at `θ = offset + scale · q + displacement`.
+    /// What the joints do at `θ = offset + scale · q + displacement`: a change of the offsets, so that an arm without any does not pay for
+    /// an addition more.
     pub(crate) fn displaced_motions(&self, q: &JointVector<S>, displacements: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
+        let mut encoders = self.encoders;
+        for (encoder, &displacement) in encoders.iter_mut().zip(&displacements.0) {
+            encoder.offset += displacement;
+        }
+        self.motions_of(&encoders, q)
+    }
+
+    fn motions_of(&self, encoders: &[Joint<S>; MAX_JOINTS], q: &JointVector<S>) -> [Motion<S>; MAX_JOINTS] {
         let mut motions = [Motion::Slide { distance_m: S::zero() }; MAX_JOINTS];
-        let joints = self.encoders[..self.joints].iter().zip(&q.0).zip(&displacements.0);
-        for (motion, ((encoder, &q), &displacement)) in motions.iter_mut().zip(joints) {
-            *motion = Motion::new(encoder, q, displacement);
+        for ((motion, encoder), q) in motions.iter_mut().zip(&encoders[..self.joints]).zip(&q.0) {
+            *motion = Motion::new(encoder, *q);
         }
         motions
     }
@@ -309,9 +350,9 @@ impl<S: Number> LinkGeometry<S> {
 }
 
 impl<S: Number> Motion<S> {
-    /// What a joint does at encoder output `q`, when its terms add a displacement.
-    fn new(joint: &Joint<S>, q: S, displacement: S) -> Self {
-        let theta = joint.offset + joint.scale * q + displacement;
+    /// What a joint does at encoder output `q`.
+    fn new(joint: &Joint<S>, q: S) -> Self {
+        let theta = joint.offset + joint.scale * q;
         match joint.kind {
             JointKind::Revolute => {
                 let (sin, cos) = theta.sine_cosine();

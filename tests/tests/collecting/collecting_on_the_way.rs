@@ -64,8 +64,9 @@ fn numbers(cell: &SimulatedCell, name: &str) -> Vec<Option<f64>> {
 fn as_measured(poses: &Dataset) -> Dataset {
     let mut poses = poses.clone();
     for row in &mut poses.rows {
-        let motion = row.motion.expect("all were measured in motion");
-        row.measurement.length_m -= motion.removed_lag_s * motion.rate_m_s;
+        if let Some(motion) = row.motion {
+            row.measurement.length_m -= motion.removed_lag_s * motion.rate_m_s;
+        }
     }
     poses
 }
