@@ -1,7 +1,8 @@
 //! How far the tool is from where a controller believes it to be, before and after, in two slices of the workspace.
 
-use ballbar::{JointVector, Kinematics, MAX_PARAMETERS, Vector3};
+use ballbar::{JointVector, Kinematics, Vector3};
 use ballbar_calib::identify::Fit;
+use ballbar_calib::kinematics::position_jacobian;
 use ballbar_calib::model::Robot;
 use nalgebra::{DMatrix, Matrix3xX};
 use rand::{RngExt, SeedableRng};
@@ -93,8 +94,6 @@ struct Predictor<'a> {
     design: Kinematics<f64>,
     fitted: Kinematics<f64>,
     free: Vec<usize>,
-    /// Of the chain.
-    parameters: usize,
     covariance: &'a DMatrix<f64>,
 }
 
@@ -105,22 +104,21 @@ impl<'a> Predictor<'a> {
             design: robot.kinematics(),
             fitted: Kinematics::with_terms(&fit.solution.chain, &fit.terms(robot)),
             free: free.map(|(index, _)| index).collect(),
-            parameters: fit.unknowns.of_chain().len(),
             covariance: &fit.uncertainty.covariance,
         }
     }
 
     fn at(&self, q: &JointVector<f64>) -> WorkspacePoint {
-        let mut rows = [[0.0; MAX_PARAMETERS]; 3];
-        let position_m = self.fitted.position_gradient(q, &Vector3::zeros(), &mut rows);
-        let mut jacobian = Matrix3xX::zeros(self.free.len());
-        for (axis, row) in rows.iter().enumerate() {
-            // What is not the chain's does not move its tool: its columns stay zero.
-            for (column, &index) in self.free.iter().enumerate().filter(|(_, index)| **index < self.parameters) {
-                jacobian[(axis, column)] = row[index];
+        let (position_m, jacobian) = position_jacobian(&self.fitted, q, &Vector3::zeros());
+        // What is not the chain's does not move its tool: its columns stay zero.
+        let column = |index: usize| jacobian.get((0, index)).map(|_| jacobian.column(index));
+        let mut of_free = Matrix3xX::zeros(self.free.len());
+        for (mut free, &index) in of_free.column_iter_mut().zip(&self.free) {
+            if let Some(column) = column(index) {
+                free.copy_from(&column);
             }
         }
-        let variance = (&jacobian * self.covariance).dot(&jacobian);
+        let variance = (&of_free * self.covariance).dot(&of_free);
         WorkspacePoint {
             position_m,
             before_m: (self.design.base_from_tool(q).translation_m - position_m).norm(),

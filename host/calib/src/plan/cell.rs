@@ -1,8 +1,6 @@
 //! A robot at its rig, and everything that a pose is judged by.
 
-use ballbar::{
-    Chain, JointKind, JointVector, Kinematics, LANES, LengthRows, MAX_PARAMETERS, Measurement, Pairing, Parameter, Quantity,
-};
+use ballbar::{Chain, JointKind, JointVector, Kinematics, LANES, LengthRows, Measurement, Pairing, Parameter};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -10,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::contact::Nearest;
 use super::fixtures::{FixturesOverlap, check_fixtures};
 use super::scene::Scene;
-use crate::kinematics::{CanonicalFrames, InverseKinematics, Posture};
+use crate::kinematics::{CanonicalFrames, InverseKinematics, Posture, with_length_gradient};
 use crate::model::{PairingId, Rig, Robot};
 use crate::unknowns::plausible_error;
 
@@ -196,10 +194,11 @@ impl<'a> Cell<'a> {
 
     /// The bar's length, and how far plausible robots may be off it, metres.
     pub fn length(&self, q: &JointVector<f64>, pairing: &Pairing<f64>) -> (f64, f64) {
-        let mut row = [0.0; MAX_PARAMETERS];
-        let length_m = self.kinematics.gradient(Quantity::Length, q, pairing, &mut row).value_m;
-        let square: f64 = row.iter().zip(&self.deviations).map(|(entry, deviation)| (entry * deviation).powi(2)).sum();
-        (length_m, RESERVED_DEVIATIONS * square.sqrt())
+        let reserve_m = |gradient: &[f64]| {
+            let squares = gradient.iter().zip(&self.deviations).map(|(entry, deviation)| (entry * deviation).powi(2));
+            RESERVED_DEVIATIONS * squares.sum::<f64>().sqrt()
+        };
+        with_length_gradient(&self.kinematics, q, pairing, |length_m, gradient| (length_m, reserve_m(gradient)))
     }
 
     /// The gradient of the length at each of some joint vectors, entries times the parameters' plausible deviations: metres.

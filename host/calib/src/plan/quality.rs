@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use ballbar::{Chain, Kinematics, MAX_PARAMETERS, Measurement, Parameter, Vector3};
-use nalgebra::{DMatrix, DVector};
+use ballbar::{Chain, Kinematics, Measurement, Parameter, Vector3};
+use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -11,6 +11,7 @@ use super::cell::plausible_deviation;
 use super::experience::NOISE_M;
 use super::information::information_of;
 use crate::identify::{Identifiability, Observation, Spectrum};
+use crate::kinematics::position_jacobian;
 use crate::model::JointLimits;
 use crate::units::mm_from_m;
 
@@ -182,16 +183,14 @@ fn amplification(chain: &Chain<f64>, limits: &[JointLimits], subset: &[usize], s
     const POSES: usize = 200;
     let kinematics = Kinematics::new(chain);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut rows = [[0.0; MAX_PARAMETERS]; 3];
     let mut sum = 0.0;
     for _ in 0..POSES {
         let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
         let Ok(q) = chain.joint_vector(&q) else { continue };
-        kinematics.position_gradient(&q, &Vector3::zeros(), &mut rows);
-        for row in &rows {
-            let column = DVector::from_iterator(subset.len(), subset.iter().zip(scales).map(|(&i, scale)| row[i] * scale));
-            sum += column.dot(&(covariance * &column));
-        }
+        let (_, jacobian) = position_jacobian(&kinematics, &q, &Vector3::zeros());
+        let mut scaled = jacobian.select_columns(subset);
+        scaled.column_iter_mut().zip(scales).for_each(|(mut column, scale)| column *= *scale);
+        sum += (&scaled * covariance).dot(&scaled);
     }
     (sum / POSES as f64).sqrt()
 }
