@@ -70,15 +70,12 @@ impl Reduction {
 
     fn add(&mut self, rows: &Rows<'_, f64>) {
         self.make_room(rows.count);
-        let residual = rows.columns.len();
-        for lane in 0..rows.count {
-            let root_weight = rows.weight[lane].sqrt();
-            for (column, entries) in rows.columns.iter().enumerate() {
-                self.triangle[(self.filled, column)] = root_weight * entries[lane];
-            }
-            self.triangle[(self.filled, residual)] = root_weight * rows.residual_m[lane];
-            self.filled += 1;
+        let root_weight = rows.weight.map(f64::sqrt);
+        for (mut column, entries) in self.triangle.column_iter_mut().zip(rows.columns.iter().chain([rows.residual_m])) {
+            let mut lanes = column.rows_mut(self.filled, rows.count);
+            lanes.iter_mut().zip(entries).zip(&root_weight).for_each(|((entry, value), weight)| *entry = weight * value);
         }
+        self.filled += rows.count;
         self.count += rows.count;
     }
 
