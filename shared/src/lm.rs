@@ -102,7 +102,7 @@ pub struct Minimum<V> {
     pub steps: usize,
 }
 
-/// Numbers of memory that [`minimise`] needs for so many unknowns: 2,214 for 36.
+/// Numbers of memory that [`minimise`] needs for so many unknowns: 2,178 for 36.
 pub const fn lm_memory<S: Real>(unknowns: usize) -> usize {
     2 * NormalEquations::<S>::memory(unknowns) + DampedSolver::<S>::memory(unknowns)
 }
