@@ -137,12 +137,16 @@ fn poses_that_came_false_are_lost_and_end_the_command_otherwise_than_well() {
     let line = line(&board, CHANGES);
     let run = record(folder.path(), &line, "3");
     assert_eq!(run.code, 1, "{}", run.transcript());
-    let losses = &run.json()["losses"];
+    let report = run.json();
+    let losses = &report["losses"];
     assert_eq!(
         (&losses["missing"], &losses["refused"]["wrong_count"], &losses["refused"]["not_finite"]),
         (&0.into(), &1.into(), &1.into())
     );
-    assert_eq!(rows(folder.path()).len(), 3, "those that are true are written");
+    // One more may have been on its way when the third had come.
+    let written = rows(folder.path()).len();
+    assert!((3..=4).contains(&written), "{written}: those that are true are written");
+    assert_eq!(report["poses_written"], written);
 }
 
 #[test]

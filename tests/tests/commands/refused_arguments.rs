@@ -20,12 +20,13 @@ fn puma_bench() -> Workbench {
 fn arguments_that_make_no_sense_are_refused() {
     const PUMA: [&str; 4] = ["--robot", "puma560", "--rig", "triangles"];
     let bench = puma_bench();
-    let cases: [(&str, &str, &[&str]); 32] = [
+    let cases: [(&str, &str, &[&str]); 33] = [
         ("fit_without_redundancy", "fit", &["one.csv", "--hold", "none", "--out", "old.toml"]),
         ("fit_of_as_many_poses_as_parameters", "fit", &["one.csv", "--out", "old.toml"]),
         ("unknown_of_no_kind", "fit", &["all.csv", "--unknown", "bar_zero"]),
         ("unknown_rig_without_a_tolerance", "fit", &["all.csv", "--unknown", "bar-zero,rig"]),
         ("unknown_latency_of_poses_that_stood", "report", &["all.csv", "--unknown", "latency", "--out", "page.html"]),
+        ("rig_to_write_that_is_known", "fit", &["all.csv", "--out-rig", "found.toml"]),
         ("hold_misspelt", "fit", &["all.csv", "--hold", "sclae3"]),
         ("hold_two_rules", "fit", &["all.csv", "--hold", "auto,none"]),
         ("hold_a_link_that_is_not_there", "fit", &["all.csv", "--hold", "x9"]),

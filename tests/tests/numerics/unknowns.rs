@@ -305,9 +305,20 @@ fn a_chuck_that_was_measured_badly_is_found_within_its_tolerance() {
     let rig = scratch.path().join("rig.toml");
     let text = std::fs::read_to_string(folder.join("rig_B_2mm_off.toml")).unwrap();
     std::fs::write(&rig, format!("tolerance_mm = 2\n{text}")).unwrap();
-    let run = fit_json(&folder, &["--rig", rig.to_str().unwrap(), "poses.csv", "--unknown", "rig"]);
+    let [robot_found, rig_found] = ["robot.toml", "found.toml"].map(|name| scratch.path().join(name));
+    let outputs = ["--out", robot_found.to_str().unwrap(), "--out-rig", rig_found.to_str().unwrap()];
+    let fit = ["--rig", rig.to_str().unwrap(), "poses.csv", "--unknown", "rig"];
+    let run = fit_json(&folder, &[&fit[..], &outputs].concat());
     assert_eq!(run.code, 0, "{}", run.stderr);
     let document = run.json();
+    // What was written belongs together.
+    let validated = |rig: &Path| {
+        let robot = robot_found.to_str().unwrap();
+        let run = host_cal_in(&folder, &["validate", "--robot", robot, "--rig", rig.to_str().unwrap(), "poses.csv", "--json"]);
+        number(&run.json(), "rms_mm")
+    };
+    assert!((validated(&rig_found) - number(&document, "rms_mm")).abs() < 1e-6, "{}", validated(&rig_found));
+    assert!(validated(&rig) > 0.3, "{}", validated(&rig));
     // Stated: 0.05 mm, of 360 lengths less what was fitted.
     assert!((0.044..0.053).contains(&number(&document, "rms_mm")), "{}", document["rms_mm"]);
     let mut chucks = open_rig(rig.to_str().unwrap()).unwrap().chucks;

@@ -1,20 +1,24 @@
 //! `host-cal fit`: from measured poses to a calibrated robot.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ballbar::Damping;
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
 use ballbar_calib::identify::{FitOptions, fit};
-use ballbar_calib::model::Dataset;
+use ballbar_calib::model::{Dataset, Rig};
+use ballbar_calib::unknowns::Kind;
 use clap::{Args, ValueEnum};
+use miette::Diagnostic;
 use serde::Serialize;
+use thiserror::Error;
 
 use super::hold::parse_hold;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::outcome::{CommandError, Outcome};
-use super::report::{Report, largest_text, print, write_calibrated};
-use super::unknowns::UnknownArgs;
+use super::report::{Report, largest_text, print, write_calibrated, write_file};
+use super::unknowns::{RigIsKnown, UnknownArgs};
 use crate::documents::{FitDocument, Fitted, HeldOutRows, ParameterLine};
+use crate::files::{FileKind, Output, Source, fitted_rig_toml, rig_source};
 use crate::remedies::Remedied;
 use crate::terminal::table::{Columns, fixed};
 use crate::text::one_line;
@@ -54,6 +58,9 @@ pub(super) struct FitArgs {
     /// Write the calibrated robot to this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Write the rig as it was found to be to this file; with `--unknown rig`
+    #[arg(long, value_name = "FILE")]
+    out_rig: Option<PathBuf>,
     #[command(flatten)]
     replace: ForceArgs,
     #[command(flatten)]
@@ -71,6 +78,9 @@ enum DampingArg {
 struct FitReport {
     #[serde(flatten)]
     document: FitDocument,
+    /// The rig's file that was written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    out_rig: Option<String>,
     #[serde(skip)]
     asked_out: Option<String>,
 }
@@ -83,6 +93,9 @@ impl FitArgs {
             DampingArg::Diagonal => Damping::Diagonal,
         };
         check_max_rms_mm(self.max_rms_mm)?;
+        if self.out_rig.is_some() && !self.unknowns.has(Kind::Rig) {
+            return Err(RigIsKnown.into());
+        }
         let measured = self.measured.read()?;
         let Measured { robot, rig, dataset, .. } = &measured;
         let unknowns = self.unknowns.blocks(robot, rig, dataset)?;
@@ -101,12 +114,17 @@ impl FitArgs {
             fit: &fit,
             assessment: &assessment,
         };
-        let mut report = FitReport { document: FitDocument::new(&fitted), asked_out: None };
+        let mut report = FitReport { document: FitDocument::new(&fitted), out_rig: None, asked_out: None };
         if let Some(path) = &self.out {
             report.asked_out = Some(path.display().to_string());
             if write_calibrated(path, self.replace.force, &measured.robot_source, &evidence, &assessment)? {
                 report.document.out = report.asked_out.clone();
             }
+        }
+        let is_worth_keeping = matches!(assessment.answer, Answer::Calibrated | Answer::Reserved);
+        if let Some(path) = self.out_rig.as_ref().filter(|_| is_worth_keeping) {
+            write_rig(path, self.replace.force, &rig_source(&measured.rig_name)?, &fit.rig(rig))?;
+            report.out_rig = Some(path.display().to_string());
         }
         print(&report, self.output.json)?;
         Ok(if report.document.answer == Answer::NotTrusted { Outcome::Doubtful } else { Outcome::Good })
@@ -136,8 +154,24 @@ impl Report for FitReport {
             (Some(out), _) => format!("\nwrote {}\n", one_line(out)),
             (None, Some(asked)) => format!("{} was not written\n", one_line(asked)),
             (None, None) => String::new(),
-        }
+        } + &self.out_rig.as_ref().map_or(String::new(), |out| format!("wrote {}\n", one_line(out)))
     }
+}
+
+/// Writes a rig's text with its ends where they were found to be.
+fn write_rig(path: &Path, force: bool, source: &Source, rig: &Rig) -> Result<(), CommandError> {
+    let edited = fitted_rig_toml(source, rig);
+    let text = edited
+        .map_err(|error| CommandError::output(RigNotEdited { name: source.name().to_owned(), reason: error.to_string() }))?;
+    write_file(Output { path, kind: FileKind::Rig, force }, &text)
+}
+
+/// The rig's text, which is kept around the new numbers.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{name}: the rig's text cannot be edited: {reason}")]
+struct RigNotEdited {
+    name: String,
+    reason: String,
 }
 
 fn parameter_cells(line: &ParameterLine) -> [String; 7] {

@@ -4,6 +4,8 @@ use ballbar_calib::model::{Dataset, Rig, Robot};
 use ballbar_calib::unknowns::{AnyBlock, Kind};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use miette::Diagnostic;
+use thiserror::Error;
 
 use super::outcome::CommandError;
 use crate::remedies::Remedied;
@@ -21,10 +23,21 @@ fn kinds() -> impl TypedValueParser<Value = Kind> {
     PossibleValuesParser::new(Kind::ALL.map(Kind::name)).try_map(|name| Kind::named(&name).ok_or("no kind of unknowns"))
 }
 
+/// Why a rig's file is not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error, Diagnostic)]
+#[error("--out-rig without `--unknown rig`: the rig stays as its file has it")]
+#[diagnostic(help("Ask for both, and give chucks and spheres that are not known exactly their `tolerance_mm` in rig.toml."))]
+pub(super) struct RigIsKnown;
+
 impl UnknownArgs {
+    /// Whether unknowns of this kind are asked for.
+    pub(super) fn has(&self, kind: Kind) -> bool {
+        self.unknown.contains(&kind)
+    }
+
     /// The unknowns that these poses have of each kind, kinds that stand twice once.
     pub(super) fn blocks(&self, robot: &Robot, rig: &Rig, dataset: &Dataset) -> Result<Vec<AnyBlock>, CommandError> {
-        let asked = Kind::ALL.into_iter().filter(|kind| self.unknown.contains(kind));
+        let asked = Kind::ALL.into_iter().filter(|&kind| self.has(kind));
         Ok(asked.map(|kind| kind.block(robot, rig, dataset).map_err(Remedied)).collect::<Result<_, _>>()?)
     }
 }

@@ -35,7 +35,7 @@ pub use poses::{pose_header, pose_record, write_poses};
 pub use problem::Problem;
 pub use protect::Refusal;
 pub use read_poses::{append_poses, read_poses};
-pub use rig::{open_rig, parse_rig};
+pub use rig::{fitted_rig_toml, open_rig, parse_rig, rig_source};
 pub use robot::{MOST_NAME_BYTES, calibrated_toml, open_robot, parse_robot, robot_source};
 pub use source::{InputError, Source};
 pub use targets::{Target, compensated_csv, joints_as_written, pose_as_written, read_targets};

@@ -4,13 +4,15 @@ use ballbar::Vector3;
 use ballbar_calib::model::{Bar, NamedPoint, Rig};
 use serde::Deserialize;
 use toml::Spanned;
+use toml_edit::DocumentMut;
 
 use super::builtin::RIGS;
 use super::numbers::{Range, deserialize, in_range, vector};
 use super::problem::Problem;
+use super::robot::set_numbers;
 use super::solids::SolidsToml;
 use super::source::{InputError, Source};
-use crate::units::m_from_mm;
+use crate::units::{m_from_mm, mm_from_m};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,7 +46,29 @@ struct BarToml {
 /// # Errors
 /// [`InputError`] naming the line and what is wrong there.
 pub fn open_rig(argument: &str) -> Result<Rig, InputError> {
-    parse_rig(&Source::named_or_read(argument, &RIGS, "rig")?)
+    parse_rig(&rig_source(argument)?)
+}
+
+/// The text of a built-in rig or of a file.
+///
+/// # Errors
+/// [`InputError`] when there is neither.
+pub fn rig_source(argument: &str) -> Result<Source, InputError> {
+    Source::named_or_read(argument, &RIGS, "rig")
+}
+
+/// A rig's text, comments and all, with its chucks and spheres where they were found to be.
+///
+/// # Errors
+/// The reason why the text could not be edited.
+pub fn fitted_rig_toml(source: &Source, rig: &Rig) -> Result<String, toml_edit::TomlError> {
+    let mut document: DocumentMut = source.text().parse()?;
+    for (key, points) in [("chucks", &rig.chucks), ("spheres", &rig.spheres)] {
+        for (i, point) in points.iter().enumerate() {
+            set_numbers(&mut document[key][i]["position_mm"], point.position_m.iter().map(|&m| mm_from_m(m)));
+        }
+    }
+    Ok(document.to_string())
 }
 
 /// Reads a rig from its TOML text.

@@ -366,7 +366,7 @@ pub(super) fn set_number(item: &mut Item, number: f64) {
     }
 }
 
-fn set_numbers(item: &mut Item, numbers: impl Iterator<Item = f64>) {
+pub(super) fn set_numbers(item: &mut Item, numbers: impl Iterator<Item = f64>) {
     if let Some(array) = item.as_array_mut() {
         for (i, number) in numbers.enumerate() {
             array.replace(i, number);

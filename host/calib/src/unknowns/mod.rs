@@ -55,6 +55,12 @@ pub trait Block {
     /// `∂computed/∂unknown` for a block of rows, metres per SI unit: one column an unknown, all zero to begin with, one lane a row.
     /// Columns are at `values`, and of measurements that are corrected already.
     fn columns(&self, values: &[f64], rows: &[&PoseRow], swept: &LengthRows<f64>, columns: &mut [Lanes<f64>]);
+
+    /// What a rig is at these values, for those who keep it; most unknowns are not a rig's.
+    fn correct_rig(&self, _values: &[f64], _rig: &mut Rig) {}
+
+    /// What joint terms are at these values, for those who keep them; most unknowns are none.
+    fn correct_terms(&self, _values: &[f64], _terms: &mut JointTerms<f64>) {}
 }
 
 /// All unknowns of a fit: those of a chain, and those of other blocks behind them.
@@ -126,23 +132,15 @@ impl Unknowns {
     /// Joint terms with what was found beside them at these values.
     pub fn terms(&self, values: &[f64], terms: &JointTerms<f64>) -> JointTerms<f64> {
         let mut found = *terms;
-        for (block, own) in self.others.iter().zip(self.other_blocks(values).map(|(_, own)| own)) {
-            if let AnyBlock::Terms(block) = block {
-                block.add_to(own, &mut found);
-            }
-        }
+        self.other_blocks(values).for_each(|(block, own)| block.correct_terms(own, &mut found));
         found
     }
 
     /// The rig at these values.
     pub fn rig(&self, values: &[f64], rig: &Rig) -> Rig {
-        let mut moved = rig.clone();
-        for (block, own) in self.others.iter().zip(self.other_blocks(values).map(|(_, own)| own)) {
-            if let AnyBlock::Rig(block) = block {
-                moved = block.at(own, &moved);
-            }
-        }
-        moved
+        let mut found = rig.clone();
+        self.other_blocks(values).for_each(|(block, own)| block.correct_rig(own, &mut found));
+        found
     }
 
     /// Hands all rows to `take`, block by block, with the columns of the wanted unknowns (indices into [`Unknowns::list`]) in their order.

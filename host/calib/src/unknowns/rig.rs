@@ -42,21 +42,6 @@ impl RigBlock {
             points_of(End::Chuck, &rig.chucks).into_iter().chain(points_of(End::Sphere, &rig.spheres)).collect();
         if points.is_empty() { Err(UnknownError::NoTolerance) } else { Ok(Self { points }) }
     }
-
-    /// The rig at these values, metres.
-    pub(super) fn at(&self, values: &[f64], rig: &Rig) -> Rig {
-        let mut moved = rig.clone();
-        for (point, by_m) in self.points.iter().zip(values.chunks(AXES.len())) {
-            let points = match point.end {
-                End::Chuck => &mut moved.chucks,
-                End::Sphere => &mut moved.spheres,
-            };
-            if let Some(point) = points.get_mut(point.index) {
-                point.position_m += Vector3::from_column_slice(by_m);
-            }
-        }
-        moved
-    }
 }
 
 impl Block for RigBlock {
@@ -95,6 +80,18 @@ impl Block for RigBlock {
                 for lane in (0..LANES).filter(|&lane| joins[lane]) {
                     column[lane] = all[lane];
                 }
+            }
+        }
+    }
+
+    fn correct_rig(&self, values: &[f64], rig: &mut Rig) {
+        for (point, by_m) in self.points.iter().zip(values.chunks(AXES.len())) {
+            let points = match point.end {
+                End::Chuck => &mut rig.chucks,
+                End::Sphere => &mut rig.spheres,
+            };
+            if let Some(point) = points.get_mut(point.index) {
+                point.position_m += Vector3::from_column_slice(by_m);
             }
         }
     }

@@ -61,14 +61,6 @@ impl TermsBlock {
         (!terms.is_empty()).then_some(Self { design, terms })
     }
 
-    /// Terms with these values added.
-    pub(super) fn add_to(&self, values: &[f64], terms: &mut JointTerms<f64>) {
-        for (Term { joint, kind }, value) in self.terms.iter().zip(values) {
-            let kind = TermKind::ALL[*kind];
-            terms.set_coefficient(*joint, kind, terms.coefficient(*joint, kind) + value);
-        }
-    }
-
     /// `φ` of each term where a row was measured.
     fn basis(&self, row: &PoseRow) -> impl Iterator<Item = f64> + '_ {
         let q = row.measurement.q;
@@ -112,6 +104,13 @@ impl Block for TermsBlock {
             for ((term, basis), column) in self.terms.iter().zip(self.basis(row)).zip(&mut *columns) {
                 column[lane] = swept.joint(term.joint)[lane] * basis;
             }
+        }
+    }
+
+    fn correct_terms(&self, values: &[f64], terms: &mut JointTerms<f64>) {
+        for (Term { joint, kind }, value) in self.terms.iter().zip(values) {
+            let kind = TermKind::ALL[*kind];
+            terms.set_coefficient(*joint, kind, terms.coefficient(*joint, kind) + value);
         }
     }
 }
