@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use ballbar::{Chain, Coupling, Encoder, JointKind, JointTerms, MAX_JOINTS};
-use ballbar_calib::model::{Calibration, EncoderFacts, JointLimits, Robot};
+use ballbar_calib::model::{Calibration, EncoderFacts, JointLimits, Robot, Tolerances};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -164,7 +164,17 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
         Some(name) => robot_name(source, name)?,
         None => one_line(source.name()).into_owned(),
     };
-    Ok(Robot { name, source: source.name().to_owned(), chain, terms, limits, encoders, calibration: file.calibration })
+    let tolerances = Tolerances::usual(chain.joint_kinds());
+    Ok(Robot {
+        name,
+        source: source.name().to_owned(),
+        chain,
+        terms,
+        tolerances,
+        limits,
+        encoders,
+        calibration: file.calibration,
+    })
 }
 
 /// A robot's text, comments and all, with other parameters, other joint terms where they have changed, and a `[calibration]` table.

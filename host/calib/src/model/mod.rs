@@ -9,6 +9,7 @@ mod robot;
 mod solids;
 #[cfg(feature = "serde")]
 mod stored;
+mod tolerances;
 
 pub use calibration::{Calibration, CalibrationVerdict};
 pub use dataset::{Dataset, MixedSigma, Motion, PoseError, PoseRow, RowWarning};
@@ -17,3 +18,4 @@ pub use limits::{BeyondLimits, JointLimits};
 pub use rig::{Bar, End, NamedPoint, PairingId, Rig, RigError};
 pub use robot::{EncoderFacts, Robot, RobotError, Standing};
 pub use solids::Solids;
+pub use tolerances::{JointTolerance, LinkTolerance, Tolerances};

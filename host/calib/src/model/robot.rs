@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::calibration::{Calibration, CalibrationVerdict};
 use super::limits::{BeyondLimits, JointLimits};
+use super::tolerances::Tolerances;
 
 /// A robot as it is believed to be. [`Robot::new`] makes one from numbers.
 #[derive(Clone, Debug)]
@@ -20,6 +21,8 @@ pub struct Robot {
     pub chain: Chain<f64>,
     /// What the joints' angles have beside offset and scale, and the masses that they bear; none of a design that says nothing.
     pub terms: JointTerms<f64>,
+    /// How well links and joints are known.
+    pub tolerances: Tolerances,
     /// Limits of each joint's encoder output, radians or metres.
     pub limits: Vec<JointLimits>,
     /// What is known of each joint's encoder.
@@ -66,6 +69,12 @@ pub enum RobotError {
     /// Terms that no chain of these joints has.
     #[error(transparent)]
     Terms(#[from] TermsError),
+    /// Tolerances are not of these links and joints, or one is no finite number from zero on.
+    #[error("tolerances are not finite numbers from 0 on, of {joints} joints and one link more")]
+    Tolerances {
+        /// Joints of the chain.
+        joints: usize,
+    },
     /// What is known of encoders is not of these joints.
     #[error("encoders of {found} joints, expected {expected}")]
     EncoderCount {
@@ -77,15 +86,17 @@ pub enum RobotError {
 }
 
 impl Robot {
-    /// A design: `limits` has one entry a joint, radians or metres as the joint is. Its `source` is its name, and nothing is known of its
-    /// encoders.
+    /// A design: `limits` has one entry a joint, radians or metres as the joint is. Its `source` is its name, its tolerances are the usual
+    /// ones, and nothing is known of its encoders.
     ///
     /// # Errors
     /// [`RobotError`] when limits are not those of the chain's joints, or not a range.
     pub fn new(name: impl Into<String>, chain: Chain<f64>, limits: Vec<JointLimits>) -> Result<Self, RobotError> {
         let name = name.into();
         let encoders = vec![EncoderFacts::UNKNOWN; chain.joints()];
-        Self { source: name.clone(), name, chain, terms: JointTerms::none(), limits, encoders, calibration: None }.checked()
+        let tolerances = Tolerances::usual(chain.joint_kinds());
+        Self { source: name.clone(), name, chain, terms: JointTerms::none(), tolerances, limits, encoders, calibration: None }
+            .checked()
     }
 
     /// What [`Robot::new`] promises of a robot, whoever has put it together.
@@ -98,6 +109,9 @@ impl Robot {
             return Err(RobotError::EncoderCount { found: self.encoders.len(), expected });
         }
         self.terms.check(self.chain.joint_kinds())?;
+        if !self.tolerances.are_of(expected) {
+            return Err(RobotError::Tolerances { joints: expected });
+        }
         match self.limits.iter().position(|limits| !limits.are_a_range()) {
             Some(i) => Err(RobotError::Limits { joint: i + 1, limits: self.limits[i] }),
             None => Ok(self),

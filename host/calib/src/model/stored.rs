@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::{
     Bar, Calibration, Dataset, EncoderFacts, JointLimits, NamedPoint, PoseRow, Rig, RigError, Robot, RobotError, Solids,
+    Tolerances,
 };
 
 #[derive(Deserialize)]
@@ -15,6 +16,7 @@ pub(super) struct RobotParts {
     chain: Chain<f64>,
     #[serde(default = "JointTerms::none")]
     terms: JointTerms<f64>,
+    tolerances: Option<Tolerances>,
     limits: Vec<JointLimits>,
     encoders: Vec<EncoderFacts>,
     calibration: Option<Calibration>,
@@ -24,8 +26,9 @@ impl TryFrom<RobotParts> for Robot {
     type Error = RobotError;
 
     fn try_from(parts: RobotParts) -> Result<Self, RobotError> {
-        let RobotParts { name, source, chain, terms, limits, encoders, calibration } = parts;
-        Self { name, source, chain, terms, limits, encoders, calibration }.checked()
+        let RobotParts { name, source, chain, terms, tolerances, limits, encoders, calibration } = parts;
+        let tolerances = tolerances.unwrap_or_else(|| Tolerances::usual(chain.joint_kinds()));
+        Self { name, source, chain, terms, tolerances, limits, encoders, calibration }.checked()
     }
 }
 
