@@ -35,6 +35,7 @@ pub mod solids;
 pub mod tampered_line;
 #[cfg(unix)]
 pub mod terminal;
+pub mod tool;
 pub mod wire_schema;
 pub mod workbench;
 pub mod workspace;

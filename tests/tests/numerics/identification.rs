@@ -2,7 +2,7 @@
 
 use ballbar::{Chain, Damping, FreeParameters, JointKind, Kinematics, Parameter};
 use ballbar_calib::identify::{
-    Finding, Fit, FitError, FitOptions, Hold, HoldRule, LmOptions, Observation, OutlierTest, ResidualSummary, Status,
+    Finding, Fit, FitError, FitOptions, Hold, HoldRule, LmOptions, Loss, Observation, OutlierTest, ResidualSummary, Status,
     Uncertainty, fit, residuals, solve_lengths,
 };
 use ballbar_calib::model::Dataset;
@@ -14,7 +14,7 @@ const SIGMA_M: f64 = 0.084e-3;
 
 fn hold(rule: HoldRule, names: &[&str]) -> FitOptions {
     let names = names.iter().map(|name| name.parse().unwrap()).collect();
-    FitOptions { hold: Hold { rule, names }, ..FitOptions::default() }
+    FitOptions { hold: Hold { rule, names }, ..FitOptions::plain() }
 }
 
 fn fit_puma(puma: &Puma, dataset: &Dataset, options: &FitOptions) -> Fit {
@@ -46,7 +46,7 @@ fn noise_free_lengths_give_the_truth_itself() {
     let puma = Puma::default();
     let poses = puma.shells(0.46, 30, 0.0, 3);
     for damping in [Damping::Identity, Damping::Diagonal] {
-        let result = fit_puma(&puma, &poses, &FitOptions { hold: Hold::paper(), damping, ..FitOptions::default() });
+        let result = fit_puma(&puma, &poses, &FitOptions { hold: Hold::paper(), damping, ..FitOptions::plain() });
         let worst = worst_parameter_difference(&result.solution.chain, &puma.truth.chain);
         assert!(worst < 1e-9, "{damping:?}: {worst:e}");
         assert!(result.solution.status.is_minimum());
@@ -70,7 +70,7 @@ fn all_54_and_the_36_reach_the_same_cost_and_the_same_kinematics() {
     let poses = puma.shells(0.46, 40, SIGMA_M, 11);
     let few = fit_puma(&puma, &poses, &hold(HoldRule::Paper, &[]));
     for damping in [Damping::Identity, Damping::Diagonal] {
-        let all = fit_puma(&puma, &poses, &FitOptions { hold: Hold::none(), damping, ..FitOptions::default() });
+        let all = fit_puma(&puma, &poses, &FitOptions { hold: Hold::none(), damping, ..FitOptions::plain() });
         assert!((all.fitted.rms_m - few.fitted.rms_m).abs() < 1e-13, "{damping:?}");
         let difference = tool_error(&few.solution.chain, &all.solution.chain, &puma.design.limits, 500, 2);
         assert!(difference.max_m < 1e-8, "{damping:?}: {:e} m", difference.max_m);
@@ -190,7 +190,7 @@ fn weak_parameters_stay_at_their_design_values() {
         let noise_m = if i % 2 == 0 { SIGMA_M } else { -SIGMA_M };
         row.measurement.length_m = truth.length(&row.measurement.q, &row.measurement.pairing) + noise_m;
     }
-    let result = fit_puma(&puma, &poses, &FitOptions::default());
+    let result = fit_puma(&puma, &poses, &FitOptions::plain());
     let scale4 = "scale4".parse::<Parameter>().unwrap().index();
     assert!(
         matches!(result.identifiability.findings[scale4], Finding::Weak { .. }),
@@ -211,8 +211,15 @@ fn a_wrong_row_is_found_and_good_rows_are_not_accused() {
 
     poses.rows[123].measurement.length_m += 3e-3;
     let result = fit_puma(&puma, &poses, &FitOptions::default());
-    let rows: Vec<usize> = result.outliers.iter().map(|outlier| outlier.row).collect();
-    assert_eq!(rows, [123]);
+    assert_eq!(result.wrong_rows.iter().map(|wrong| wrong.row).collect::<Vec<_>>(), [123]);
+    let rest = ballbar_tests::experiment::dataset(poses.rows.iter().filter(|row| row.number != 124).cloned().collect());
+    assert_eq!(
+        result.solution.values,
+        fit_puma(&puma, &rest, &FitOptions::default()).solution.values,
+        "as if it had not been measured"
+    );
+    let kept = fit_puma(&puma, &poses, &FitOptions { loss: Loss::None, ..FitOptions::default() });
+    assert_eq!(kept.outliers.iter().map(|outlier| outlier.row).collect::<Vec<_>>(), [123]);
 }
 
 #[test]
@@ -224,7 +231,7 @@ fn a_wrong_row_hidden_by_a_jump_of_the_zero_is_found_among_its_neighbours() {
         row.measurement.length_m += if i / 30 % 2 == 0 { 1.5e-3 } else { -1.5e-3 };
     }
     poses.rows[75].measurement.length_m -= 4e-3;
-    let result = fit_puma(&puma, &poses, &FitOptions::default());
+    let result = fit_puma(&puma, &poses, &FitOptions::plain());
     assert!(result.neighbour_correlation.unwrap() > 0.5);
     let found = result.outliers.iter().find(|outlier| outlier.row == 75).unwrap();
     assert_eq!(found.test, OutlierTest::Neighbours);
@@ -234,7 +241,7 @@ fn a_wrong_row_hidden_by_a_jump_of_the_zero_is_found_among_its_neighbours() {
 fn a_subset_is_chosen_around_parameters_held_by_name() {
     let puma = Puma::default();
     let poses = puma.shells(0.46, 20, SIGMA_M, 7);
-    let auto = fit_puma(&puma, &poses, &FitOptions::default());
+    let auto = fit_puma(&puma, &poses, &FitOptions::plain());
     for names in [&["alpha1"][..], &["alpha1", "z1"]] {
         let around = fit_puma(&puma, &poses, &hold(HoldRule::Auto, names));
         assert_eq!(around.free_parameters(), 36, "{names:?}");

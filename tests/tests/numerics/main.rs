@@ -11,6 +11,7 @@ mod identification;
 mod joint_terms;
 mod normal_equations;
 mod precision;
+mod priors;
 mod ranks;
 mod real_data;
 mod report_proofs;

@@ -12,6 +12,7 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::beliefs::BeliefArgs;
 use super::hold::parse_hold;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::outcome::{CommandError, Outcome};
@@ -47,6 +48,8 @@ pub(super) struct FitArgs {
     /// Parameters to leave at their design values: auto, paper, none, and names
     #[arg(long, default_value = "auto", value_name = "RULE|NAME,…")]
     hold: String,
+    #[command(flatten)]
+    beliefs: BeliefArgs,
     #[command(flatten)]
     unknowns: UnknownArgs,
     /// What damps the steps: the identity as in the paper, or the diagonal of the normal matrix
@@ -99,7 +102,8 @@ impl FitArgs {
         let measured = self.measured.read()?;
         let Measured { robot, rig, dataset, .. } = &measured;
         let unknowns = self.unknowns.blocks(robot, rig, dataset)?;
-        let fit = fit(robot, dataset, &FitOptions { hold, damping, unknowns }).map_err(Remedied)?;
+        let (prior, loss) = (self.beliefs.prior(), self.beliefs.loss());
+        let fit = fit(robot, dataset, &FitOptions { hold, prior, loss, damping, unknowns }).map_err(Remedied)?;
         let unseen: Vec<(String, &Dataset)> = measured.unseen().into_iter().collect();
         let evidence = Evidence { robot, rig, dataset, fit: &fit, unseen: &unseen, max_rms_m: self.max_rms_mm.map(m_from_mm) };
         let assessment = Assessment::new(&evidence);
@@ -148,6 +152,7 @@ impl Report for FitReport {
         text += &pairings_text(document);
         text += "\nlargest residuals (measured less computed)\n";
         text += &largest_text(&document.largest);
+        text += &left_out_text(document);
         text += &outliers_text(document);
         text += &verdict_text(document);
         text + &match (&document.out, &self.asked_out) {
@@ -212,6 +217,10 @@ fn headline(document: &FitDocument) -> String {
         }
     );
     text += &format!("RMS {:.4} mm before, {:.4} mm after", document.rms_initial_mm, document.rms_mm);
+    if let Some(prior) = &document.prior {
+        text +=
+            &format!("; lengths decide {:.1} of them, tolerances inside the arm times {:.2} the rest", prior.told, prior.factor);
+    }
     if let Some(held_out) = &document.held_out {
         text += &format!("; {:.4} mm on poses left out ({} folds)", held_out.rms_mm, held_out.folds);
     }
@@ -238,6 +247,17 @@ fn pairings_text(document: &FitDocument) -> String {
         table.row([fitted.pairing.clone(), fitted.poses.to_string()].into_iter().chain(numbers));
     }
     table.text()
+}
+
+fn left_out_text(document: &FitDocument) -> String {
+    if document.left_out.is_empty() {
+        return String::new();
+    }
+    let mut table = Columns::new(&["row", "<at", "residual mm", "std. devs"]);
+    for line in &document.left_out {
+        table.row([line.row.to_string(), line.place.clone(), fixed(line.residual_mm, 4), format!("{:+.0}", line.deviations)]);
+    }
+    format!("\nleft out: these rows contradict the others\n{}", table.text())
 }
 
 fn outliers_text(document: &FitDocument) -> String {

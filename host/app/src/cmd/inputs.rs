@@ -7,6 +7,7 @@ use clap::Args;
 use miette::Diagnostic;
 use thiserror::Error;
 
+use super::exclude::Exclude;
 use super::hold_out::HoldOut;
 use super::outcome::CommandError;
 use super::report::warn;
@@ -42,6 +43,9 @@ pub(super) struct MeasuredArgs {
     /// takes these, `report` shows how well a fit to the others predicts these
     #[arg(long, value_name = "KEY=VALUE,…")]
     hold_out: Option<HoldOut>,
+    /// Leave these rows out: numbers from 1 over all files, and ranges of them, as in 12,40-45
+    #[arg(long, value_name = "ROW,…")]
+    exclude: Option<Exclude>,
     /// Files of measured poses (poses.csv), or sessions
     #[arg(required = true, value_name = "SESSION|POSES")]
     poses: Vec<PathBuf>,
@@ -78,6 +82,10 @@ impl MeasuredArgs {
         for warning in &warnings {
             warn(warning);
         }
+        let dataset = match &self.exclude {
+            None => dataset,
+            Some(rows) => rows.others(dataset)?,
+        };
         let (held_out, dataset) = match &self.hold_out {
             None => (None, dataset),
             Some(rule) => {

@@ -4,11 +4,13 @@
 //! `--json`. Progress and warnings go to stderr.
 
 mod apply;
+mod beliefs;
 mod collect;
 mod compensate;
 mod completions;
 #[cfg(unix)]
 mod demo;
+mod exclude;
 mod export;
 mod fit;
 mod fk;

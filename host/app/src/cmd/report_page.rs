@@ -10,6 +10,7 @@ use miette::Diagnostic;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::beliefs::BeliefArgs;
 use super::hold::parse_hold;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::outcome::{CommandError, Outcome};
@@ -39,6 +40,8 @@ pub(super) struct ReportArgs {
     /// Parameters to leave at their design values, as `fit` takes them
     #[arg(long, default_value = "auto", value_name = "RULE|NAME,…")]
     hold: String,
+    #[command(flatten)]
+    beliefs: BeliefArgs,
     #[command(flatten)]
     unknowns: UnknownArgs,
     /// The largest RMS residual that is believed, as `fit` takes it
@@ -115,8 +118,9 @@ impl ReportArgs {
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;
         let unknowns = self.unknowns.blocks(&measured.robot, &measured.rig, &measured.dataset)?;
-        let fit =
-            fit(&measured.robot, &measured.dataset, &FitOptions { hold, unknowns, ..FitOptions::default() }).map_err(Remedied)?;
+        let (prior, loss) = (self.beliefs.prior(), self.beliefs.loss());
+        let options = FitOptions { hold, prior, loss, unknowns, ..FitOptions::default() };
+        let fit = fit(&measured.robot, &measured.dataset, &options).map_err(Remedied)?;
 
         let remarks = remarks(&measured.robot.chain, &measured.dataset, &measured.rig, &measured.robot.limits);
         let unseen: Vec<(String, &Dataset)> =

@@ -2,7 +2,8 @@
 
 use ballbar_calib::assess::{Answer, Assessment, Refusal};
 use ballbar_calib::identify::{
-    ConvergenceTest, Fit, FitRemark, FittedParameter, Outlier, OutlierTest, PairingResiduals, Status, explanation, remarks,
+    ConvergenceTest, Fit, FitRemark, FittedParameter, Outlier, OutlierTest, PairingResiduals, Status, WrongRow, explanation,
+    remarks,
 };
 use ballbar_calib::model::{Dataset, Rig, Robot};
 use serde::Serialize;
@@ -63,6 +64,10 @@ pub struct FitDocument {
     pub outliers: Vec<usize>,
     /// The same rows, the worst first.
     pub outlier_details: Vec<OutlierLine>,
+    /// Rows that were left out of the fit, because they contradict the others.
+    pub left_out: Vec<LeftOutLine>,
+    /// What the tolerances of the robot's file had to say; none where they were not asked.
+    pub prior: Option<PriorLine>,
     /// The largest residuals.
     pub largest: Vec<ResidualLine>,
     /// What to know of the poses, a sentence each.
@@ -143,6 +148,30 @@ pub struct OutlierLine {
     pub beside: &'static str,
 }
 
+/// A row that was left out.
+#[derive(Clone, Debug, Serialize)]
+pub struct LeftOutLine {
+    /// From 1, over all files.
+    pub row: usize,
+    /// File and line.
+    pub place: String,
+    /// Measured less computed.
+    pub residual_mm: f64,
+    /// The same in standard deviations of a good row.
+    pub deviations: f64,
+}
+
+/// What tolerances had to say.
+#[derive(Clone, Debug, Serialize)]
+pub struct PriorLine {
+    /// By which those inside the arm were multiplied.
+    pub factor: f64,
+    /// Unknowns that the lengths decided, of those that are free.
+    pub told: f64,
+    /// Parts that were fitted as if nothing had been known of them.
+    pub released: Vec<String>,
+}
+
 /// What a document of a fit is made of.
 #[derive(Clone, Copy, Debug)]
 pub struct Fitted<'a> {
@@ -198,6 +227,12 @@ impl FitDocument {
             by_pairing: pairing_changes(rig, fit),
             outliers: outlier_details.iter().map(|outlier| outlier.row).collect(),
             outlier_details,
+            left_out: left_out_lines(dataset, fit),
+            prior: fit.prior.as_ref().map(|prior| PriorLine {
+                factor: prior.factor,
+                told: fit.uncertainty.told,
+                released: prior.released.iter().map(|released| released.part.to_string()).collect(),
+            }),
             largest: largest(dataset, rig, &fit.residuals, 5),
             remarks: remarks(&robot.chain, dataset, rig, &robot.limits)
                 .into_iter()
@@ -234,6 +269,13 @@ impl ParameterLine {
 
 fn remark_text(remark: &FitRemark, dataset: &Dataset) -> String {
     match *remark {
+        FitRemark::LeftOut { count, worst_row, worst_m } => format!(
+            "{} left out (list at the end), the worst at {} with {:.3} mm: {} the others.",
+            if count == 1 { "1 row was".to_owned() } else { format!("{count} rows were") },
+            dataset.place(worst_row),
+            mm_from_m(worst_m),
+            if count == 1 { "it contradicts" } else { "they contradict" }
+        ),
         FitRemark::Outliers { count, worst_row, worst_m } => format!(
             "{} stand out (list at the end), the worst at {} with {:.3} mm. They weigh on all numbers here: look at them first.",
             if count == 1 { "1 row".to_owned() } else { format!("{count} rows") },
@@ -254,6 +296,16 @@ fn pairing_changes(rig: &Rig, fit: &Fit) -> Vec<PairingChange> {
         fitted: PairingLine::new(rig, fitted),
     };
     pairs.map(change).collect()
+}
+
+fn left_out_lines(dataset: &Dataset, fit: &Fit) -> Vec<LeftOutLine> {
+    let line = |wrong: &WrongRow| LeftOutLine {
+        row: dataset.rows[wrong.row].number,
+        place: dataset.place(wrong.row),
+        residual_mm: mm_from_m(wrong.residual_m),
+        deviations: wrong.deviations,
+    };
+    fit.wrong_rows.iter().map(line).collect()
 }
 
 fn outlier_lines(dataset: &Dataset, fit: &Fit) -> Vec<OutlierLine> {

@@ -118,7 +118,7 @@ pub fn run(seed: u64, mut on_step: impl FnMut(f64)) -> Result<Experiment, Experi
         };
         shells.simulate(|| ()).map_err(Remedied)
     };
-    let options = FitOptions { hold: Hold::paper(), ..FitOptions::default() };
+    let options = FitOptions { hold: Hold::paper(), ..FitOptions::plain() };
 
     let fitted_shells = shells(stated::FITTED_RADIUS_MM, stated::FITTED_RMS_MM, seed)?;
     on_step(0.1);

@@ -104,7 +104,8 @@ impl Assessment {
         let Evidence { robot, dataset, fit, .. } = evidence;
         let order = Order::new(&dataset.rows.iter().map(|row| row.t_s).collect::<Vec<_>>());
         let placed = by_pairing(evidence, &order);
-        let whitened_m: Vec<f64> = fit.residuals.iter().map(|residual| residual.whitened_m()).collect();
+        let counting = fit.residuals.iter().filter(|residual| residual.weight > 0.0);
+        let whitened_m: Vec<f64> = counting.map(|residual| residual.whitened_m()).collect();
         let rms_limit = RmsLimit::new(dataset, evidence.max_rms_m);
         let mut assessment = Self {
             answer: Answer::NotTrusted,
@@ -112,7 +113,7 @@ impl Assessment {
             refusals: Vec::new(),
             suspicion: None,
             rms_limit,
-            proofs: proofs(evidence, residuals(&robot.kinematics(), dataset)),
+            proofs: proofs(evidence, fit.counted(residuals(&robot.kinematics(), dataset))),
             trend: trend(evidence, &placed),
             farthest_offset: offset(evidence, &placed),
             by_pairing: placed.into_iter().map(|group| group.into_iter().map(|(_, residual)| residual).collect()).collect(),

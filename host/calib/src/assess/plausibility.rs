@@ -5,6 +5,7 @@ use std::fmt;
 use ballbar::{Chain, JointKind, Link};
 use nalgebra::Rotation3;
 
+use crate::identify::Fit;
 use crate::kinematics::CanonicalFrames;
 use crate::model::{Dataset, Robot};
 use crate::units::{ScreenUnit, fixed};
@@ -57,7 +58,16 @@ const TEN_DEGREES: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// a rotation is split into three angles means nothing, and both robots are seen in the design's canonical frames: a frame that somebody wrote a
 /// hundred metres away moves by as much with the least turn.
 pub(super) fn large_changes(design: &Chain<f64>, fitted: &Chain<f64>) -> Vec<Change> {
-    let frames = CanonicalFrames::new(design);
+    changes_since(design, design, fitted)
+}
+
+/// The same of a fit that may have found lost zeros: links are compared as if those had not been lost.
+pub(super) fn large_changes_of(design: &Chain<f64>, fit: &Fit) -> Vec<Change> {
+    changes_since(design, &fit.remastered(design), &fit.solution.chain)
+}
+
+fn changes_since(as_written: &Chain<f64>, design: &Chain<f64>, fitted: &Chain<f64>) -> Vec<Change> {
+    let (remastered, frames) = (design, CanonicalFrames::new(design));
     let (design, fitted) = (frames.chain(), &frames.in_canonical_frames(fitted));
     let joints = design.joints();
     let mut changes = Vec::new();
@@ -84,9 +94,11 @@ pub(super) fn large_changes(design: &Chain<f64>, fitted: &Chain<f64>) -> Vec<Cha
     for i in 0..joints {
         let (Some(before), Some(after)) = (design.joint(i), fitted.joint(i)) else { continue };
         let unit = ScreenUnit::from(before.kind);
+        let lost = remastered.joint(i).zip(as_written.joint(i)).map_or(0.0, |(found, written)| found.offset - written.offset);
+        let off = after.offset - before.offset + lost;
         let (off, bounds) = match before.kind {
-            JointKind::Revolute => (wrapped(after.offset - before.offset), ENDS.rotation_rad),
-            JointKind::Prismatic => ((after.offset - before.offset).abs(), ENDS.displacement_m),
+            JointKind::Revolute => (wrapped(off), ENDS.rotation_rad),
+            JointKind::Prismatic => (off.abs(), ENDS.displacement_m),
         };
         judge(format!("the zero of joint {}", i + 1), off, unit, bounds);
         let of_scale = (after.scale - before.scale).abs() / before.scale.abs();

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::evidence::Evidence;
-use super::plausibility::{Change, far_beyond_limits, large_changes};
+use super::plausibility::{Change, far_beyond_limits, large_changes_of};
 use super::proof::{Proof, ProofKind};
 use crate::identify::{Fit, Status, explanation};
 use crate::model::Dataset;
@@ -77,6 +77,13 @@ pub enum Refusal {
         /// What it exceeds.
         limit: RmsLimit,
     },
+    /// So many rows contradict the others that nobody can say which of them are right.
+    TooManyWrong {
+        /// Rows that were left out.
+        rows: usize,
+        /// Of how many.
+        of: usize,
+    },
     /// Too many poses have joint values that the robot cannot have.
     BeyondLimits {
         /// Such poses.
@@ -122,6 +129,10 @@ impl fmt::Display for Refusal {
                 write!(f, "The fit leaves an RMS of {}, more than {}, {ground}: ", mm(*rms_m), mm(limit.limit_m))?;
                 f.write_str("robot, rig and poses do not belong together as the files say, or lengths are wrong.")
             }
+            Self::TooManyWrong { rows, of } => write!(
+                f,
+                "{rows} of {of} lengths contradict the others and had to be left out, more than a quarter: nobody can say which of them are right."
+            ),
             Self::BeyondLimits { rows, of, joint, place } => write!(
                 f,
                 "{rows} of {of} poses have joints far beyond their limits, the first at {place}, joint {joint}: these are not joint values of this \
@@ -158,6 +169,9 @@ pub(super) enum Judged {
 /// Poses that may have a joint far beyond its limits before the robot or the file is not believed: single rows are outliers.
 const FEW: f64 = 0.05;
 
+/// Rows that may be left out before the others are no longer believed.
+const MOST_WRONG: f64 = 0.25;
+
 /// Whether the start may be the truth: its residuals can be believed, and are within two standard deviations of one length as the fit
 /// estimates it.
 fn is_as_good(fit: &Fit, limit: RmsLimit) -> bool {
@@ -193,7 +207,7 @@ pub(super) fn judge(evidence: &Evidence<'_>, limit: RmsLimit, proofs: &[Proof]) 
             after_m: proof.after_summary().rms_m,
         }));
         let impossible: Vec<Change> =
-            large_changes(&robot.chain, &fit.solution.chain).into_iter().filter(|change| change.is_impossible).collect();
+            large_changes_of(&robot.chain, fit).into_iter().filter(|change| change.is_impossible).collect();
         if !impossible.is_empty() {
             refusals.push(Refusal::Implausible(impossible));
         }
@@ -203,6 +217,10 @@ pub(super) fn judge(evidence: &Evidence<'_>, limit: RmsLimit, proofs: &[Proof]) 
         refusals.push(Refusal::TooLarge { rms_m, limit });
     }
     let of = dataset.rows.len();
+    let wrong = fit.wrong_rows.len();
+    if wrong as f64 > MOST_WRONG * of as f64 {
+        refusals.push(Refusal::TooManyWrong { rows: wrong, of });
+    }
     if let Some(beyond) = far_beyond_limits(robot, dataset).filter(|beyond| beyond.rows as f64 > FEW * of as f64) {
         let place = dataset.place(beyond.first);
         refusals.push(Refusal::BeyondLimits { rows: beyond.rows, of, joint: beyond.joint, place });

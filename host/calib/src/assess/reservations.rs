@@ -1,18 +1,22 @@
 //! What weighs on the numbers of a fit that is worth keeping, in whole sentences.
 
 use super::evidence::Evidence;
-use super::plausibility::{far_beyond_limits, large_changes};
+use super::plausibility::{Change, far_beyond_limits, large_changes_of};
 use super::proof::{Proof, decisive};
 use super::refusals::moved;
-use crate::identify::{ALIKE, AndersonDarling, Offset, Trend};
+use ballbar::JointKind;
+
+use crate::identify::{ALIKE, AndersonDarling, Fit, Offset, Part, Released, Trend};
 use crate::units::{fixed, mm_from_m};
 
 /// Lengths left out may be predicted by this factor worse than those fitted before it is said.
 const MUCH_WORSE: f64 = 2.0;
 /// Of normal residuals one set in a thousand looks less normal.
 const SURELY_NOT: f64 = 1e-3;
-/// Noise of a bar is known within this factor.
-const BEYOND_STATED: f64 = 2.0;
+/// More rows than this that had to be left out say something of those that were not.
+const MANY_WRONG: f64 = 0.05;
+/// Unknowns of which the lengths decide a smaller part lean on what was believed beforehand.
+const MOSTLY_TOLD: f64 = 0.9;
 /// Files of poses end at a nanometre: residuals below a micrometre are of simulations without noise, and compare with nothing.
 const ROUNDING_M: f64 = 1e-6;
 
@@ -57,6 +61,17 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
         reserves.push(format!(
             "Of {independent} parameters that these poses tell, {told} were fitted: the others were held, right or wrong."
         ));
+    }
+    let free = fit.free_parameters();
+    if able == independent && fit.uncertainty.told < MOSTLY_TOLD * free as f64 {
+        reserves.push(format!(
+            "The lengths decide {} of {free} parameters; for the rest the result leans on the tolerances of the robot's file.",
+            fixed(fit.uncertainty.told, 1)
+        ));
+    }
+    let (wrong, of) = (fit.wrong_rows.len(), dataset.rows.len());
+    if wrong as f64 > MANY_WRONG * of as f64 {
+        reserves.push(format!("{wrong} of {of} lengths contradict the others and were left out."));
     }
     match fit.outliers.as_slice() {
         [] => {}
@@ -112,15 +127,10 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
             ));
         }
     }
-    if let (Some(sigma_m), Some(stated_m)) = (fit.uncertainty.sigma_m, dataset.stated_sigma_m())
-        && sigma_m > BEYOND_STATED * stated_m
-    {
-        reserves.push(format!(
-            "Lengths scatter about the fit by {:.1} times the noise that the poses state: the model, the rig's coordinates or that noise is wrong.",
-            sigma_m / stated_m
-        ));
-    }
-    let far = large_changes(&robot.chain, &fit.solution.chain);
+    reserves.extend(noise(evidence));
+    reserves.extend(fit.prior.iter().flat_map(|prior| &prior.released).map(released));
+    let mut far = large_changes_of(&robot.chain, fit);
+    far.retain(|change| !is_released(change, fit));
     if !far.is_empty() && !is_unchanged {
         reserves.push(format!(
             "{}: far more than designs are off. Does the robot stand, and is its tool, as its file says?",
@@ -137,4 +147,51 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
         ));
     }
     reserves
+}
+
+/// Lengths that deviate otherwise than the poses state.
+fn noise(evidence: &Evidence<'_>) -> Option<String> {
+    let Evidence { dataset, fit, .. } = evidence;
+    let (seen_m, stated_m) = (fit.uncertainty.sigma_m?, dataset.stated_sigma_m()?);
+    let test = fit.uncertainty.noise_test(stated_m)?;
+    let (factor, chi2, freedom) = (seen_m / stated_m, fixed(test.chi2, 0), fixed(test.freedom, 0));
+    if test.is_more() {
+        Some(format!(
+            "Lengths scatter about the fit by {factor:.1} times the noise that the poses state (χ² of {chi2} for {freedom} degrees of freedom): \
+             the model, the rig's coordinates or that noise is wrong."
+        ))
+    } else {
+        test.is_less().then(|| {
+            format!(
+                "Lengths scatter about the fit by only {factor:.2} times the noise that the poses state (χ² of {chi2} for {freedom} degrees of \
+                 freedom): that noise is wrong, or lengths are not as independent as they look."
+            )
+        })
+    }
+}
+
+/// A part that was fitted as if nothing had been known of it.
+fn released(released: &Released) -> String {
+    let Released { part, change, tolerance } = *released;
+    let times = fixed(change.abs() / tolerance, 0);
+    let (size, cause) = match part {
+        Part::Offset(_, JointKind::Revolute) => (format!("{:+.1}°", change.to_degrees()), "was its mastering lost?"),
+        Part::Offset(_, JointKind::Prismatic) => (format!("{} mm", fixed(mm_from_m(change), 2)), "was its zero lost?"),
+        Part::Displacement(_) => {
+            (format!("{} mm", fixed(mm_from_m(change), 2)), "is this the design of another robot, or was a part changed?")
+        }
+        Part::Rotation(_) => {
+            (format!("{:.2}°", change.to_degrees()), "is this the design of another robot, or was a part changed?")
+        }
+        Part::Scale(_) => (fixed(change, 5), "is its gear another one?"),
+    };
+    let part = part.to_string();
+    let capital = part[..1].to_uppercase();
+    format!("{capital}{} is off by {size}, {times} times its tolerance: {cause}", &part[1..])
+}
+
+/// Whether a change is one that was said of a part already.
+fn is_released(change: &Change, fit: &Fit) -> bool {
+    let parts = fit.prior.iter().flat_map(|prior| &prior.released);
+    parts.into_iter().any(|released| released.part.to_string() == change.part)
 }

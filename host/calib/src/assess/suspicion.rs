@@ -75,7 +75,8 @@ pub(super) fn suspect(evidence: &Evidence<'_>, refusals: &[Refusal]) -> Option<S
     let is_too_large = refusals.iter().any(|refusal| matches!(refusal, Refusal::TooLarge { .. }));
     let is_implausible = refusals.iter().any(|refusal| matches!(refusal, Refusal::Implausible(_)));
     let is_beyond_limits = refusals.iter().any(|refusal| matches!(refusal, Refusal::BeyondLimits { .. }));
-    if !(is_too_large || is_implausible || is_beyond_limits) {
+    let is_divided = refusals.iter().any(|refusal| matches!(refusal, Refusal::TooManyWrong { .. }));
+    if !(is_too_large || is_implausible || is_beyond_limits || is_divided) {
         return None;
     }
     let trial = Trial::new(evidence);

@@ -28,13 +28,14 @@ pub(super) fn cross_validate(
     lm: &LmOptions,
     in_blocks: bool,
 ) -> Option<(CrossValidation, Vec<Residual>)> {
-    let Objective { unknowns, rows, free, .. } = *objective;
+    let Objective { unknowns, rows, beliefs, .. } = *objective;
     let kinds = unknowns.of_chain().design().joint_kinds();
     let group_of_row = postures(kinds, rows.iter().map(|row| &row.measurement.q));
     let groups = group_of_row.iter().max().map_or(0, |last| last + 1);
     let fold_of = |group: usize, folds: usize| if in_blocks { group * folds / groups } else { group % folds };
     let kept = |folds: usize, fold: usize| group_of_row.iter().filter(|&&group| fold_of(group, folds) != fold).count();
-    let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| kept(folds, fold) > free.len());
+    let is_enough = |rows: usize| rows + beliefs.believed() > beliefs.free().len();
+    let enough = |&folds: &usize| folds <= groups && (0..folds).all(|fold| is_enough(kept(folds, fold)));
     let folds = [5, 10, groups].into_iter().find(enough)?;
 
     let mut left_out = vec![Residual { value_m: 0.0, weight: 1.0 }; rows.len()];

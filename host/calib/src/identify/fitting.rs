@@ -3,32 +3,73 @@
 use std::time::Instant;
 
 use ballbar::{Chain, Damping, JointTerms, LmOptions, Parameter};
+use nalgebra::DMatrix;
 use thiserror::Error;
 
+use super::beliefs::Beliefs;
 use super::cross_validation::cross_validate;
-use super::fit::{Fit, FittedParameter};
+use super::estimate::{Estimate, Estimator, Rule};
+use super::fit::{Fit, FittedParameter, PriorFacts, Released};
 use super::hold::{Held, Hold};
 use super::identifiability::Identifiability;
 use super::in_user_frames::in_user_frames;
 use super::lm::{Objective, solve};
+use super::noise::believed_sigma_m;
 use super::observation::Observation;
+use super::prior::ChainPrior;
+use super::reference::{Reference, independent_columns};
 use super::residual::{Residual, ResidualSummary};
 use super::residuals::{ALIKE, by_pairing, neighbour_correlation, outliers};
+use super::robust::{WrongRow, estimate_robustly};
+use super::spectrum::Spectrum;
 use super::uncertainty::Uncertainty;
 use crate::kinematics::CanonicalFrames;
-use crate::model::{Dataset, JointLimits, PoseRow, Robot};
+use crate::model::{Dataset, PoseRow, Robot};
 use crate::unknowns::{AnyBlock, Unknowns};
 
-/// What to find out beside the chain, what to hold, and how to step.
+/// What to find out beside the chain, what to hold, what to believe, and how to step.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FitOptions {
     /// Parameters that stay at their design values.
     pub hold: Hold,
+    /// What is believed of the others.
+    pub prior: PriorRule,
+    /// What becomes of rows that contradict the others.
+    pub loss: Loss,
     /// λI or λ·diag.
     pub damping: Damping,
     /// What is not known beside the chain ([`crate::unknowns::Kind::block`]).
     pub unknowns: Vec<AnyBlock>,
+}
+
+/// What is believed of a chain before anything is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum PriorRule {
+    /// What its tolerances say.
+    #[default]
+    Tolerances,
+    /// Nothing: lengths alone decide, and what they do not tell is held.
+    None,
+}
+
+/// What becomes of rows that contradict the others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Loss {
+    /// They are left out, by Tukey's biweight and studentised residuals.
+    #[default]
+    Tukey,
+    /// They are fitted with the others.
+    None,
+}
+
+impl FitOptions {
+    /// The paper's least squares: nothing believed, and all rows fitted.
+    pub fn plain() -> Self {
+        Self { prior: PriorRule::None, loss: Loss::None, ..Self::default() }
+    }
 }
 
 /// Why there is no fit.
@@ -48,14 +89,15 @@ pub enum FitError {
 }
 
 /// Fits the robot's parameters, and what else [`FitOptions::unknowns`] asks for, to the dataset: Levenberg-Marquardt on
-/// `Σ w (d_measured − d_computed)²` ([`solve`]) from the design, over what [`FitOptions::hold`] leaves free; then what the result is worth, by linear theory and by poses left out in turn.
+/// `Σ f²/σ² + Σ (change/tolerance)²` from the design, over what [`FitOptions::hold`] leaves free, of the rows that no others contradict; then
+/// what the result is worth, by linear theory and by poses left out in turn.
 ///
 /// Which parameters are held by themselves does not depend on how the robot's frames are written: they are found out, and the others fitted, in
 /// canonical frames, and values and deviations come back in the robot's own. Whoever holds a parameter by name, or none, or the paper's, means
 /// those of the frames as they are written.
 ///
-/// The minimum is the paper's least-squares solution (A. Goswami, A. Quaid and M. Peshkin, IEEE Control Systems 13(5), 1993); which parameters
-/// are free is found anew for each dataset ([`Identifiability`]).
+/// With [`FitOptions::plain`] the minimum is the paper's least-squares solution (A. Goswami, A. Quaid and M. Peshkin, IEEE Control Systems 13(5),
+/// 1993); which parameters are free is then found anew for each dataset ([`Identifiability`]).
 ///
 /// ```
 /// use ballbar_calib::designs;
@@ -82,14 +124,15 @@ pub enum FitError {
 /// [`FitError`] when there are no more poses than free parameters, or when a parameter is to be held that the robot lacks.
 pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit, FitError> {
     if !options.hold.is_of_any_frames() {
-        return fit_as_written(&robot.chain, &robot.terms, &robot.limits, dataset, options);
+        return fit_as_written(&robot.chain, &robot.terms, robot, dataset, options);
     }
     let frames = CanonicalFrames::new(&robot.chain);
-    let canonical = fit_as_written(frames.chain(), &frames.terms(&robot.terms), &robot.limits, dataset, options)?;
+    let canonical = fit_as_written(frames.chain(), &frames.terms(&robot.terms), robot, dataset, options)?;
+    // Redundant parameters come back at their design values, but zeros that were lost as they were found.
+    let frames = CanonicalFrames::new(&canonical.remastered(&robot.chain));
     let unknowns = Unknowns::new(&robot.chain, &robot.terms, options.unknowns.clone());
     let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
-    let observation = Observation::of(&unknowns, &unknowns.start(), &rows, sigma_of(dataset));
-    let found = Identifiability::of(unknowns.of_chain(), unknowns.list(), &observation, &robot.limits, &[]);
+    let found = what_poses_tell(&unknowns, &rows, robot, believed_sigma_m(dataset), &[]);
     Ok(in_user_frames(canonical, &frames, unknowns, &found))
 }
 
@@ -97,47 +140,90 @@ pub fn fit(robot: &Robot, dataset: &Dataset, options: &FitOptions) -> Result<Fit
 fn fit_as_written(
     design: &Chain<f64>,
     terms: &JointTerms<f64>,
-    limits: &[JointLimits],
+    robot: &Robot,
     dataset: &Dataset,
     options: &FitOptions,
 ) -> Result<Fit, FitError> {
     let unknowns = Unknowns::new(design, terms, options.unknowns.clone());
-    let chain = unknowns.of_chain();
-    let named: Vec<usize> = options.hold.names.iter().map(|name| name.index()).collect();
-    if let Some(&name) = options.hold.names.iter().find(|name| name.index() >= chain.len()) {
+    let hold = &options.hold;
+    let named: Vec<usize> = hold.names.iter().map(|name| name.index()).collect();
+    if let Some(&name) = hold.names.iter().find(|name| name.index() >= unknowns.of_chain().len()) {
         return Err(FitError::NoSuchParameter(name));
     }
-    let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
-    let start = unknowns.start();
-    let found = |sigma_m: f64| {
-        Identifiability::of(chain, unknowns.list(), &Observation::of(&unknowns, &start, &rows, sigma_m), limits, &named)
-    };
-    let sigma_m = sigma_m(dataset, &unknowns, |sigma_m| found(sigma_m).noise_m);
-    let identifiability = found(sigma_m);
-    let reasons = options.hold.reasons(chain, &identifiability);
-    let free: Vec<usize> = (0..reasons.len()).filter(|&index| reasons[index].is_none()).collect();
-    let beliefs = free.iter().filter(|&&index| unknowns.list()[index].tolerance.is_some()).count();
-    if rows.len() + beliefs <= free.len() {
-        return Err(FitError::NoRedundancy { rows: rows.len(), free: free.len() - beliefs });
-    }
+    let all_rows: Vec<&PoseRow> = dataset.rows.iter().collect();
+    let usual_m = sigma_m(dataset, &unknowns, |sigma_m| what_poses_tell(&unknowns, &all_rows, robot, sigma_m, &named).noise_m);
+    let identifiability = what_poses_tell(&unknowns, &all_rows, robot, usual_m, &named);
+    let reference = Dependence::new(design, robot);
 
     let lm = LmOptions { damping: options.damping, ..LmOptions::default() };
-    let objective = Objective { unknowns: &unknowns, rows: &rows, free: &free, sigma_m };
+    let chain_prior = (options.prior == PriorRule::Tolerances).then(|| ChainPrior::new(design, &robot.tolerances, &robot.limits));
+    let exact: Vec<usize> = chain_prior.iter().flat_map(ChainPrior::exact).collect();
+    let reasons = |first: &[usize]| match &chain_prior {
+        None => hold.reasons(unknowns.of_chain().len(), &reference.independent(&[], &[]), &identifiability),
+        Some(_) => {
+            let apart: Vec<usize> = named.iter().chain(&exact).copied().collect();
+            hold.reasons_beside_prior(unknowns.of_chain().len(), &reference.independent(first, &apart), &exact, &identifiability)
+        }
+    };
+    let free = |first: &[usize]| free_of(&reasons(first));
+    let rule = match &chain_prior {
+        None => Rule::Plain(free(&[])),
+        Some(chain) => Rule::Prior { chain, free: &free },
+    };
+    let mut estimator = Estimator { unknowns: &unknowns, lm, stated_m: dataset.stated_sigma_m(), usual_m, rule };
+    let start = estimator.first_beliefs();
+    if all_rows.len() + start.believed() <= start.free().len() {
+        return Err(FitError::NoRedundancy { rows: all_rows.len(), free: start.free().len() - start.believed() });
+    }
+
     let began = Instant::now();
-    let solution = solve(&objective, &lm);
+    let (mut estimate, mut wrong_rows) = estimated(&estimator, &all_rows, &start, options.loss);
+    let mut kept = kept_rows(&all_rows, &wrong_rows);
+    let mut uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, chain_prior.is_some());
+    if let Some(seen_m) = uncertainty.beyond_stated_m(estimator.stated_m).filter(|_| chain_prior.is_some()) {
+        // What the rows state is not what they do: beliefs are weighed against what they do.
+        estimator.stated_m = Some(seen_m);
+        (estimate, wrong_rows) = estimated(&estimator, &all_rows, &start, options.loss);
+        kept = kept_rows(&all_rows, &wrong_rows);
+        uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, true);
+    }
     let solve_time = began.elapsed();
 
-    let uncertainty = Uncertainty::new(&Observation::of(&unknowns, &solution.values, &rows, sigma_m), &free);
-    let before = residuals_at(&unknowns, &start, dataset);
-    let after = residuals_at(&unknowns, &solution.values, dataset);
-    let base_alone = base_alone(&objective, dataset, &reasons, &lm);
+    let Estimate { beliefs, sigma_m, weighing, released, solution } = estimate;
+    let released_indices: Vec<usize> =
+        chain_prior.iter().flat_map(|chain| weighing.released.iter().flat_map(|part| chain.indices(*part))).collect();
+    let reasons = reasons(&released_indices);
+    let objective = Objective { unknowns: &unknowns, rows: &kept, beliefs: &beliefs, sigma_m };
+    let is_wrong = |row: usize| wrong_rows.iter().any(|wrong| wrong.row == row);
+    let residuals_at = |values: &[f64]| {
+        let mut residuals = Residual::of_rows(&unknowns, values, dataset.rows.iter());
+        wrong_rows.iter().for_each(|wrong| residuals[wrong.row].weight = 0.0);
+        residuals
+    };
+    let before = residuals_at(&unknowns.start());
+    let after = residuals_at(&solution.values);
+    let base_alone = base_alone(&objective, &reasons, &lm).map(|values| ResidualSummary::new(&residuals_at(&values)));
     let neighbour_correlation = neighbour_correlation(dataset, &after);
     let in_blocks = neighbour_correlation.is_some_and(|correlation| correlation > ALIKE);
-    let (cross_validation, left_out) = cross_validate(&objective, &lm, in_blocks).unzip();
+    let (cross_validation, of_kept) = cross_validate(&objective, &lm, in_blocks).unzip();
+    let left_out = of_kept.map_or_else(Vec::new, |of_kept| {
+        let mut left_out = after.clone();
+        let kept = (0..left_out.len()).filter(|&row| !is_wrong(row)).collect::<Vec<_>>();
+        kept.into_iter().zip(of_kept).for_each(|(row, residual)| left_out[row] = residual);
+        left_out
+    });
     Ok(Fit {
         solve_time,
         identifiability,
-        parameters: fitted_parameters(&unknowns, &solution.values, &free, &uncertainty, reasons),
+        prior: chain_prior.is_some().then(|| PriorFacts {
+            factor: weighing.factor,
+            sigma_m,
+            released: released
+                .iter()
+                .map(|share| Released { part: share.part, change: share.change, tolerance: share.tolerance })
+                .collect(),
+        }),
+        parameters: fitted_parameters(&unknowns, &solution.values, beliefs.free(), &uncertainty, reasons),
         initial: ResidualSummary::new(&before),
         fitted: ResidualSummary::new(&after),
         initial_by_pairing: by_pairing(dataset, &before),
@@ -145,13 +231,62 @@ fn fit_as_written(
         outliers: outliers(dataset, &after),
         neighbour_correlation,
         cross_validation,
-        left_out: left_out.unwrap_or_default(),
+        left_out,
         base_alone,
         residuals: after,
         uncertainty,
+        wrong_rows,
         solution,
         unknowns,
     })
+}
+
+fn estimated(estimator: &Estimator<'_>, rows: &[&PoseRow], start: &Beliefs, loss: Loss) -> (Estimate, Vec<WrongRow>) {
+    match loss {
+        Loss::Tukey => estimate_robustly(estimator, rows, start),
+        Loss::None => (estimator.estimate(rows), Vec::new()),
+    }
+}
+
+fn kept_rows<'a>(rows: &[&'a PoseRow], wrong: &[WrongRow]) -> Vec<&'a PoseRow> {
+    let is_wrong = |row: usize| wrong.iter().any(|wrong| wrong.row == row);
+    (0..rows.len()).filter(|&row| !is_wrong(row)).map(|row| rows[row]).collect()
+}
+
+fn free_of(reasons: &[Option<Held>]) -> Vec<usize> {
+    (0..reasons.len()).filter(|&index| reasons[index].is_none()).collect()
+}
+
+/// What of a chain's parameters is dependent in every experiment.
+struct Dependence<'a> {
+    design: &'a Chain<f64>,
+    jacobian: DMatrix<f64>,
+    rank: usize,
+}
+
+impl<'a> Dependence<'a> {
+    fn new(design: &'a Chain<f64>, robot: &Robot) -> Self {
+        let jacobian = Reference::new(design, &robot.limits).jacobian(design);
+        let rank = Spectrum::new(&jacobian).rank;
+        Self { design, jacobian, rank }
+    }
+
+    /// Independent parameters, ascending: those at `first` before those that the paper frees, and these before the others; none of those
+    /// that are set `apart`.
+    fn independent(&self, first: &[usize], apart: &[usize]) -> Vec<usize> {
+        let others = (0..self.design.parameter_count()).filter(|index| !first.contains(index) && !apart.contains(index));
+        let is_last = |index: &usize| self.design.is_conventionally_held(Parameter::from_index(*index));
+        let (last, usual): (Vec<usize>, Vec<usize>) = others.partition(is_last);
+        independent_columns(&[first.to_vec(), usual, last], &self.jacobian, self.rank)
+    }
+}
+
+/// What the poses can tell at the design, around the parameters at the indices `held`.
+fn what_poses_tell(unknowns: &Unknowns, rows: &[&PoseRow], robot: &Robot, sigma_m: f64, held: &[usize]) -> Identifiability {
+    let believed: Vec<usize> = (0..unknowns.list().len()).filter(|&index| unknowns.list()[index].tolerance.is_some()).collect();
+    let beliefs = Beliefs::without_chain(unknowns, believed);
+    let observation = Observation::of(unknowns, &unknowns.start(), rows, Some((&beliefs, sigma_m)));
+    Identifiability::of(unknowns.of_chain(), unknowns.list(), &observation, &robot.limits, held)
 }
 
 /// What a length of weight one deviates by, metres: as it is stated, or else as the lengths show it. Without meaning, and not looked for,
@@ -160,29 +295,17 @@ fn sigma_m(dataset: &Dataset, unknowns: &Unknowns, shown_m: impl Fn(f64) -> f64)
     /// Each beside the one before; more change nothing that could be seen.
     const ROUNDS: usize = 2;
     if dataset.stated_sigma_m().is_some() || !unknowns.have_priors() {
-        return sigma_of(dataset);
+        return believed_sigma_m(dataset);
     }
-    (0..ROUNDS).fold(sigma_of(dataset), |sigma_m, _| shown_m(sigma_m).max(f64::MIN_POSITIVE))
-}
-
-/// As it is stated, or as good ball-bars have it.
-fn sigma_of(dataset: &Dataset) -> f64 {
-    const USUAL_M: f64 = 5e-5;
-    dataset.stated_sigma_m().unwrap_or(USUAL_M)
-}
-
-fn residuals_at(unknowns: &Unknowns, values: &[f64], dataset: &Dataset) -> Vec<Residual> {
-    Residual::of_rows(unknowns, values, dataset.rows.iter())
+    (0..ROUNDS).fold(believed_sigma_m(dataset), |sigma_m, _| shown_m(sigma_m).max(f64::MIN_POSITIVE))
 }
 
 /// What of the design's error is only that nobody knew where the robot stands: no fault of the robot, and corrected by a frame.
-fn base_alone(objective: &Objective<'_>, dataset: &Dataset, reasons: &[Option<Held>], lm: &LmOptions) -> Option<ResidualSummary> {
+fn base_alone(objective: &Objective<'_>, reasons: &[Option<Held>], lm: &LmOptions) -> Option<Vec<f64>> {
     let base: Vec<usize> = objective.unknowns.of_chain().of_base().collect();
     let is_wanted = base.iter().all(|&index| !matches!(reasons[index], Some(Held::ByName)));
-    is_wanted.then(|| {
-        let values = solve(&Objective { free: &base, ..*objective }, lm).values;
-        ResidualSummary::new(&residuals_at(objective.unknowns, &values, dataset))
-    })
+    let beliefs = Beliefs::without_chain(objective.unknowns, base);
+    is_wanted.then(|| solve(&Objective { beliefs: &beliefs, ..*objective }, lm).values)
 }
 
 fn fitted_parameters(

@@ -5,7 +5,6 @@ use std::fmt;
 use ballbar::Parameter;
 
 use super::identifiability::{Finding, Identifiability};
-use crate::unknowns::ChainBlock;
 
 /// Which parameters stay at their design values: a rule, and parameters by name besides.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,13 +45,38 @@ impl Hold {
         self.rule == HoldRule::Auto && self.names.is_empty()
     }
 
-    /// Why each unknown is held; `None` for the free ones.
-    pub fn reasons(&self, chain: &ChainBlock, found: &Identifiability) -> Vec<Option<Held>> {
+    /// Why each unknown is held; `None` for the free ones. `independent` are the chain's parameters that a fit of all of them would free, of
+    /// `parameters` in all.
+    pub(super) fn reasons(&self, parameters: usize, independent: &[usize], found: &Identifiability) -> Vec<Option<Held>> {
         let reason = |(index, finding): (usize, &Finding)| match self.rule {
             _ if self.names.iter().any(|name| name.index() == index) => Some(Held::ByName),
             HoldRule::Auto if *finding != Finding::Identified => Some(Held::Finding(finding.clone())),
-            HoldRule::Paper if chain.is_held_in_paper(index) => Some(Held::AsInPaper),
+            HoldRule::Paper if index < parameters && !independent.contains(&index) => Some(Held::AsInPaper),
             HoldRule::Auto | HoldRule::Paper | HoldRule::None => None,
+        };
+        found.findings.iter().enumerate().map(reason).collect()
+    }
+
+    /// The same where tolerances say of the chain's parameters what the poses do not: only those are held that nothing could tell, and those
+    /// that are known exactly.
+    pub(super) fn reasons_beside_prior(
+        &self,
+        parameters: usize,
+        independent: &[usize],
+        exact: &[usize],
+        found: &Identifiability,
+    ) -> Vec<Option<Held>> {
+        let reason = |(index, finding): (usize, &Finding)| match self.rule {
+            _ if self.names.iter().any(|name| name.index() == index) => Some(Held::ByName),
+            _ if exact.contains(&index) => Some(Held::Exact),
+            HoldRule::None => None,
+            _ if index < parameters => (!independent.contains(&index)).then(|| match (self.rule, finding) {
+                (HoldRule::Paper, _) => Held::AsInPaper,
+                (_, Finding::Redundant { .. }) => Held::Finding(finding.clone()),
+                // What is told by chance in these poses stands in for what was chosen.
+                _ => Held::Finding(Finding::Redundant { with: Vec::new() }),
+            }),
+            _ => (*finding != Finding::Identified).then(|| Held::Finding(finding.clone())),
         };
         found.findings.iter().enumerate().map(reason).collect()
     }
@@ -66,6 +90,8 @@ pub enum Held {
     ByName,
     /// The paper holds it.
     AsInPaper,
+    /// Its tolerance is zero.
+    Exact,
     /// The poses do not identify it.
     Finding(Finding),
 }
@@ -75,6 +101,7 @@ impl fmt::Display for Held {
         match self {
             Self::ByName => f.write_str("by name"),
             Self::AsInPaper => f.write_str("as in the paper"),
+            Self::Exact => f.write_str("known exactly"),
             Self::Finding(finding) => finding.fmt(f),
         }
     }

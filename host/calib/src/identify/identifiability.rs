@@ -2,14 +2,13 @@
 
 use std::fmt;
 
-use ballbar::{Chain, JointTerms, Measurement, Pairing, ParameterUnit, Vector3};
+use ballbar::{Chain, JointTerms, Measurement, ParameterUnit};
 use nalgebra::DMatrix;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::observation::Observation;
 use super::pivoting::PivotedColumns;
-use super::spectrum::{RANK_THRESHOLD, Spectrum, column_scales, is_zero_column};
+use super::reference::{Reference, independent_columns};
+use super::spectrum::{Spectrum, is_zero_column};
 use crate::model::{Dataset, JointLimits, PoseRow, Robot};
 use crate::units::ScreenUnit;
 use crate::unknowns::{ChainBlock, Unknown, Unknowns};
@@ -139,8 +138,7 @@ impl Identifiability {
     pub fn of_robot(robot: &Robot, dataset: &Dataset) -> Self {
         let unknowns = Unknowns::new(&robot.chain, &robot.terms, Vec::new());
         let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
-        // No parameter has a tolerance that a deviation would be weighed against.
-        let observation = Observation::of(&unknowns, &unknowns.start(), &rows, 1.0);
+        let observation = Observation::of(&unknowns, &unknowns.start(), &rows, None);
         Self::of(unknowns.of_chain(), unknowns.list(), &observation, &robot.limits, &[])
     }
 
@@ -152,14 +150,19 @@ impl Identifiability {
         limits: &[JointLimits],
         held: &[usize],
     ) -> Self {
-        let is_last = |index: usize| chain.is_held_in_paper(index);
+        let groups = |held: &[usize]| {
+            let all = (0..unknowns.len()).filter(|index| !held.contains(index));
+            let (last, first): (Vec<usize>, Vec<usize>) = all.partition(|&index| chain.is_held_in_paper(index));
+            [first, last]
+        };
         let names: Vec<String> = unknowns.iter().map(|unknown| unknown.name.clone()).collect();
         let spectrum = Spectrum::new(&observation.jacobian);
-        let independent = independent_columns(is_last, &observation.jacobian, spectrum.rank, held);
+        let independent = independent_columns(&groups(held), &observation.jacobian, spectrum.rank);
         let noise_m = unexplained_rms(observation, &independent);
 
-        let reference = reference_jacobian(chain.design(), limits);
-        let always_independent = independent_columns(is_last, &reference, Spectrum::new(&reference).rank, held);
+        let reference = Reference::new(chain.design(), limits).jacobian(chain.design());
+        let of_chain = groups(held).map(|group| group.into_iter().filter(|&index| index < chain.len()).collect());
+        let always_independent = independent_columns(&of_chain, &reference, Spectrum::new(&reference).rank);
         let is_redundant = |index: usize| index < chain.len() && !always_independent.contains(&index);
         let called = |indices: Vec<usize>| indices.into_iter().map(|index| names[index].clone()).collect();
 
@@ -196,30 +199,9 @@ impl Identifiability {
     }
 }
 
-/// A largest independent subset of the columns, ascending: first as many as possible of those that are not `is_last`, which for a chain
-/// are those that the paper leaves free, then of the others. In each group in the order of what the scaled columns add, the second group
-/// after what the first explains.
-fn independent_columns(is_last: impl Fn(usize) -> bool, jacobian: &DMatrix<f64>, rank: usize, held: &[usize]) -> Vec<usize> {
-    let all = (0..jacobian.ncols()).filter(|index| !held.contains(index));
-    let (last, first): (Vec<_>, Vec<_>) = all.partition(|&index| is_last(index));
-    let scales = column_scales(jacobian);
-    let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| jacobian[(row, column)] / scales[column]);
-
-    // Scaled columns have unit norm, so pivots compare with 1.
-    let of_first = PivotedColumns::new(scaled.select_columns(&first), RANK_THRESHOLD);
-    let rest = scaled.select_columns(&last);
-    let unexplained = &rest - &of_first.basis * of_first.basis.tr_mul(&rest);
-    let of_last = PivotedColumns::new(unexplained, RANK_THRESHOLD);
-
-    let mut chosen: Vec<usize> = of_first.order.iter().map(|&k| first[k]).chain(of_last.order.iter().map(|&k| last[k])).collect();
-    chosen.truncate(rank);
-    chosen.sort_unstable();
-    chosen
-}
-
 /// RMS of the residual's part outside the span of the columns, per degree of freedom.
 fn unexplained_rms(observation: &Observation, independent: &[usize]) -> f64 {
-    let freedom = observation.count.saturating_sub(independent.len());
+    let freedom = (observation.count + observation.beliefs.nrows()).saturating_sub(independent.len());
     if freedom == 0 {
         return 0.0;
     }
@@ -260,24 +242,4 @@ fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<usize>
     // A thousandth part is not what makes a column look like another.
     let strongest = shares.first().map_or(0.0, |share| share.1);
     shares.iter().take_while(|share| share.1 > 1e-3 * strongest).map(|share| share.0).collect()
-}
-
-/// The Jacobian of an experiment that excites whatever can be excited: random poses within the limits, random pairings of
-/// three chucks and three spheres. What is dependent here is dependent in every experiment.
-fn reference_jacobian(chain: &Chain<f64>, limits: &[JointLimits]) -> DMatrix<f64> {
-    const ROWS_PER_PARAMETER: usize = 4;
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut point = |reach_m: f64| Vector3::from_fn(|_, _| rng.random_range(-reach_m..reach_m));
-    let chucks: [Vector3<f64>; 3] = std::array::from_fn(|_| point(1.0));
-    let spheres: [Vector3<f64>; 3] = std::array::from_fn(|_| point(0.2));
-    let count = ROWS_PER_PARAMETER * chain.parameter_count();
-    let measurements: Vec<Measurement<f64>> = (0..count)
-        .filter_map(|i| {
-            let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
-            let pairing = Pairing { chuck_base_m: chucks[i % 3], sphere_tool_m: spheres[i / 3 % 3] };
-            let q = chain.joint_vector(&q).ok()?;
-            Some(Measurement::new(pairing, q, 0.0))
-        })
-        .collect();
-    Observation::new(chain, &measurements).jacobian
 }

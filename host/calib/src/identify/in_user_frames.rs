@@ -37,13 +37,21 @@ pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unkno
         initial: unknown.start,
         fitted: value,
         std: std_of(index),
-        held: if moves[index] { None } else { Some(reason(index, canonical, &found.findings[index])) },
+        held: if moves[index] || value != unknown.start {
+            // A zero that was lost has changed, though nothing in these frames moves it.
+            None
+        } else {
+            Some(reason(index, canonical, &found.findings[index]))
+        },
     });
     let parameters: Vec<FittedParameter> = parameters.collect();
     let mut identifiability = fit.identifiability;
-    for (finding, parameter) in identifiability.findings.iter_mut().zip(&parameters) {
+    let findings = identifiability.findings.iter_mut().zip(&parameters).zip(&found.findings);
+    for ((finding, parameter), found) in findings {
         *finding = match &parameter.held {
             Some(Held::Finding(reason)) => reason.clone(),
+            // What beliefs free the poses need not tell.
+            None if fit.prior.is_some() && !matches!(found, Finding::Redundant { .. }) => found.clone(),
             _ => Finding::Identified,
         };
     }

@@ -5,20 +5,21 @@ use ballbar::{
     lm_memory, minimise,
 };
 
+use super::beliefs::Beliefs;
 use crate::model::PoseRow;
 use crate::unknowns::Unknowns;
 
-/// What is minimised: `Σ w (d_measured − d_computed)² + Σ (σ · change / tolerance)²` over some of the unknowns; the others stay where they are.
+/// What is minimised: `Σ w (d_measured − d_computed)² + σ² · changeᵀ Λ change` over some of the unknowns; the others stay where they are.
 #[derive(Clone, Copy, Debug)]
-pub struct Objective<'a> {
+pub(super) struct Objective<'a> {
     /// All unknowns.
-    pub unknowns: &'a Unknowns,
+    pub(super) unknowns: &'a Unknowns,
     /// The rows that count.
-    pub rows: &'a [&'a PoseRow],
-    /// Indices of the unknowns that may change, ascending.
-    pub free: &'a [usize],
-    /// Deviation of a length of weight one, metres: what tolerances are weighed against. Without meaning where no unknown has one.
-    pub sigma_m: f64,
+    pub(super) rows: &'a [&'a PoseRow],
+    /// Which unknowns may change, and what is believed of them.
+    pub(super) beliefs: &'a Beliefs,
+    /// Deviation of a length of weight one, metres: what beliefs are weighed against. Without meaning where there are none.
+    pub(super) sigma_m: f64,
 }
 
 /// Where a solve ended.
@@ -44,16 +45,21 @@ impl Solution {
 
 /// Minimises an objective, beginning with what the unknowns are believed to be, after K. Levenberg (1944) and D. W. Marquardt (1963), the paper's
 /// eq. 7 and 10. Never fails: [`Status`] says where it ended.
-pub fn solve(objective: &Objective<'_>, options: &LmOptions) -> Solution {
+pub(super) fn solve(objective: &Objective<'_>, options: &LmOptions) -> Solution {
+    solve_from(objective, objective.unknowns.start(), options)
+}
+
+/// The same from other values.
+pub(super) fn solve_from(objective: &Objective<'_>, from: Vec<f64>, options: &LmOptions) -> Solution {
     let start = objective.unknowns.start();
-    let problem = FromStart { objective, precision: objective.unknowns.precision(objective.sigma_m), start: &start };
+    let problem = Believed { objective, precision: objective.beliefs.packed(objective.sigma_m), start: &start };
     let mut rms_history_m = Vec::new();
-    let mut memory = vec![0.0; lm_memory::<f64>(objective.free.len())];
-    let minimum = minimise(&problem, start.clone(), options, &mut memory, |rms_m| rms_history_m.push(rms_m));
+    let mut memory = vec![0.0; lm_memory::<f64>(problem.unknowns())];
+    let minimum = minimise(&problem, from.clone(), options, &mut memory, |rms_m| rms_history_m.push(rms_m));
     let (status, values) = match minimum {
         Ok(minimum) => (minimum.status, minimum.values),
         // The memory is as long as was asked for.
-        Err(_) => (Status::NothingObservable, start.clone()),
+        Err(_) => (Status::NothingObservable, from),
     };
     Solution { status, chain: objective.unknowns.chain(&values), values, rms_history_m }
 }
@@ -76,33 +82,31 @@ pub fn solve_lengths(
     Solution { status, values: chain.parameters().to_vec(), chain, rms_history_m }
 }
 
-struct FromStart<'a> {
+struct Believed<'a> {
     objective: &'a Objective<'a>,
-    /// Of all unknowns.
-    precision: Vec<f64>,
+    /// `σ² Λ`, packed; `None` where nothing is believed.
+    precision: Option<Vec<f64>>,
     start: &'a [f64],
 }
 
-impl Problem<f64> for FromStart<'_> {
+impl Problem<f64> for Believed<'_> {
     type Values = Vec<f64>;
 
     fn unknowns(&self) -> usize {
-        self.objective.free.len()
+        self.objective.beliefs.free().len()
     }
 
     fn add_to(&self, values: &Vec<f64>, equations: &mut NormalEquations<'_, f64>) {
-        let Objective { unknowns, rows, free, .. } = *self.objective;
-        unknowns.for_each_block(values, rows, free, |rows| equations.add(rows));
-        if unknowns.have_priors() {
-            let deviation: Vec<f64> = free.iter().map(|&index| values[index] - self.start[index]).collect();
-            let precision: Vec<f64> = free.iter().map(|&index| self.precision[index]).collect();
-            equations.add_prior(&deviation, Precision::Diagonal(&precision));
+        let Objective { unknowns, rows, beliefs, .. } = *self.objective;
+        unknowns.for_each_block(values, rows, beliefs.free(), |rows| equations.add(rows));
+        if let Some(precision) = &self.precision {
+            equations.add_prior(&beliefs.change(values, self.start), Precision::Full(precision));
         }
     }
 
     fn moved(&self, values: &Vec<f64>, change: &[f64]) -> Vec<f64> {
         let mut moved = values.clone();
-        for (&index, &by) in self.objective.free.iter().zip(change) {
+        for (&index, &by) in self.objective.beliefs.free().iter().zip(change) {
             moved[index] += by;
         }
         moved

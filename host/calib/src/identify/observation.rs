@@ -1,8 +1,9 @@
 //! The Jacobian and residuals of a set of measurements at one set of values.
 
 use ballbar::{Chain, Kinematics, LANES, Lanes, LengthRows, Measurement, Rows};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, RowDVector};
 
+use super::beliefs::Beliefs;
 use crate::model::PoseRow;
 use crate::unknowns::Unknowns;
 
@@ -14,8 +15,12 @@ pub struct Observation {
     pub jacobian: DMatrix<f64>,
     /// Residuals, measured less computed, seen from the rows of `jacobian`.
     pub residual_m: DVector<f64>,
-    /// Measurements, and beliefs that count as such.
+    /// Measurements.
     pub count: usize,
+    /// `Σ w f²` of the measurements alone, square metres.
+    pub square_m2: f64,
+    /// The rows of `√w J` that are beliefs, as they are before they are reduced: one column for each of the P unknowns.
+    pub beliefs: DMatrix<f64>,
 }
 
 impl Observation {
@@ -33,15 +38,17 @@ impl Observation {
         reduction.end()
     }
 
-    /// Evaluates rows over all unknowns, at these values, with what is believed of them beside lengths that deviate by `sigma_m` (metres, of
-    /// weight one).
-    pub fn of(unknowns: &Unknowns, values: &[f64], rows: &[&PoseRow], sigma_m: f64) -> Self {
+    /// Evaluates rows over all unknowns, at these values, and beside lengths that deviate by `sigma_m` (metres, of weight one) what is believed
+    /// of some of them.
+    pub(super) fn of(unknowns: &Unknowns, values: &[f64], rows: &[&PoseRow], believed: Option<(&Beliefs, f64)>) -> Self {
         let all: Vec<usize> = (0..unknowns.list().len()).collect();
         let mut reduction = Reduction::new(all.len());
         unknowns.for_each_block(values, rows, &all, |rows| reduction.add(rows));
-        for (index, (unknown, precision)) in unknowns.list().iter().zip(unknowns.precision(sigma_m)).enumerate() {
-            if precision > 0.0 {
-                reduction.add_belief(index, precision.sqrt(), values[index] - unknown.start);
+        if let Some((beliefs, sigma_m)) = believed {
+            let change = beliefs.change(values, &unknowns.start());
+            for row in (beliefs.rows() * sigma_m).row_iter() {
+                let residual_m = -row.iter().zip(&change).map(|(entry, by)| entry * by).sum::<f64>();
+                reduction.add_belief(beliefs.free(), row.iter().copied(), residual_m);
             }
         }
         reduction.end()
@@ -58,6 +65,8 @@ struct Reduction {
     triangle: DMatrix<f64>,
     filled: usize,
     count: usize,
+    square_m2: f64,
+    beliefs: Vec<RowDVector<f64>>,
 }
 
 impl Reduction {
@@ -65,7 +74,13 @@ impl Reduction {
     const KEPT: usize = 1024;
 
     fn new(unknowns: usize) -> Self {
-        Self { triangle: DMatrix::zeros(Self::KEPT + unknowns + 1, unknowns + 1), filled: 0, count: 0 }
+        Self {
+            triangle: DMatrix::zeros(Self::KEPT + unknowns + 1, unknowns + 1),
+            filled: 0,
+            count: 0,
+            square_m2: 0.0,
+            beliefs: Vec::new(),
+        }
     }
 
     fn add(&mut self, rows: &Rows<'_, f64>) {
@@ -77,16 +92,19 @@ impl Reduction {
         }
         self.filled += rows.count;
         self.count += rows.count;
+        let squares = rows.residual_m.iter().zip(rows.weight).map(|(f, weight)| weight * f * f);
+        self.square_m2 += squares.take(rows.count).sum::<f64>();
     }
 
-    fn add_belief(&mut self, unknown: usize, root_precision: f64, deviation: f64) {
+    fn add_belief(&mut self, unknowns: &[usize], entries: impl Iterator<Item = f64>, residual_m: f64) {
         self.make_room(1);
-        self.triangle.row_mut(self.filled).fill(0.0);
-        self.triangle[(self.filled, unknown)] = root_precision;
         let residual = self.triangle.ncols() - 1;
-        self.triangle[(self.filled, residual)] = -root_precision * deviation;
+        let mut row = RowDVector::zeros(residual);
+        unknowns.iter().zip(entries).for_each(|(&index, entry)| row[index] = entry);
+        self.triangle.view_mut((self.filled, 0), (1, residual)).copy_from(&row);
+        self.triangle[(self.filled, residual)] = residual_m;
         self.filled += 1;
-        self.count += 1;
+        self.beliefs.push(row);
     }
 
     fn make_room(&mut self, rows: usize) {
@@ -106,6 +124,8 @@ impl Reduction {
         let triangle = self.reduced();
         let last = triangle.ncols() - 1;
         let residual_m = triangle.column(last).into_owned();
-        Observation { jacobian: triangle.remove_column(last), residual_m, count: self.count }
+        let beliefs = if self.beliefs.is_empty() { DMatrix::zeros(0, last) } else { DMatrix::from_rows(&self.beliefs) };
+        let Self { count, square_m2, .. } = self;
+        Observation { jacobian: triangle.remove_column(last), residual_m, count, square_m2, beliefs }
     }
 }

@@ -47,14 +47,15 @@ pub struct ResidualSummary {
 }
 
 impl ResidualSummary {
-    /// Summarises residuals; RMS and mean are weighted (all weights alike: the plain ones), and not a number where there are none.
+    /// Summarises those residuals that have a weight; RMS and mean are weighted (all weights alike: the plain ones), and not a number where
+    /// there are none.
     pub fn new(residuals: &[Residual]) -> Self {
         let weight: f64 = residuals.iter().map(|f| f.weight).sum();
         Self {
-            count: residuals.len(),
+            count: residuals.iter().filter(|f| f.weight > 0.0).count(),
             rms_m: (residuals.iter().map(|f| f.weight * f.value_m * f.value_m).sum::<f64>() / weight).sqrt(),
             mean_m: residuals.iter().map(|f| f.weight * f.value_m).sum::<f64>() / weight,
-            max_abs_m: residuals.iter().fold(0.0, |largest, f| largest.max(f.value_m.abs())),
+            max_abs_m: residuals.iter().filter(|f| f.weight > 0.0).fold(0.0, |largest, f| largest.max(f.value_m.abs())),
         }
     }
 }

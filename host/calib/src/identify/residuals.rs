@@ -70,10 +70,12 @@ const SMALLEST_SPREAD_M: f64 = 1e-9;
 /// deviation (F. R. Hampel, J. American Statistical Association 69, 1974). `residuals` has one entry a row.
 pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
     let residuals_m: &[f64] = &residuals.iter().map(|f| f.whitened_m()).collect::<Vec<_>>();
+    let counts = |row: usize| residuals[row].weight > 0.0;
     let stated_m = dataset.stated_sigma_m().unwrap_or_default();
-    let middle = median(residuals_m.to_vec());
-    let global = scores(&residuals_m.iter().map(|f| Some(f - middle)).collect::<Vec<_>>(), stated_m);
-    let local = scores(&deviations_from_neighbours(dataset, residuals_m), stated_m);
+    let middle = median((0..residuals.len()).filter(|&row| counts(row)).map(|row| residuals_m[row]).collect());
+    let off = |row: usize| counts(row).then(|| residuals_m[row] - middle);
+    let global = scores(&(0..residuals.len()).map(off).collect::<Vec<_>>(), stated_m);
+    let local = scores(&deviations_from_neighbours(dataset, residuals), stated_m);
     let rows = global.iter().zip(&local).enumerate();
     let mut outliers: Vec<Outlier> = rows
         .map(|(row, (&all, &neighbours))| {
@@ -92,17 +94,18 @@ pub fn outliers(dataset: &Dataset, residuals: &[Residual]) -> Vec<Outlier> {
 /// Correlation of each residual with the next one of the same pairing, both less the pairing's mean, in the order of measurement;
 /// `None` for fewer than twenty such neighbours. Independent noise gives `0 ± 1/√n`. `residuals` has one entry a row.
 pub fn neighbour_correlation(dataset: &Dataset, residuals: &[Residual]) -> Option<f64> {
-    let of_pairing = |pairing| dataset.rows_of(pairing).map(|row| residuals[row]).collect();
+    let of_pairing = |pairing| dataset.rows_of(pairing).map(|row| residuals[row]).filter(|f| f.weight > 0.0).collect();
     let groups: Vec<Vec<Residual>> = dataset.pairings().into_iter().map(of_pairing).collect();
     correlation_of_neighbours(&groups)
 }
 
 /// Each residual less the median of those around it, pairing by pairing, in the order of measurement; `None` for a row with
 /// fewer than [`NEIGHBOURS`] around it.
-fn deviations_from_neighbours(dataset: &Dataset, residuals_m: &[f64]) -> Vec<Option<f64>> {
+fn deviations_from_neighbours(dataset: &Dataset, residuals: &[Residual]) -> Vec<Option<f64>> {
+    let residuals_m: Vec<f64> = residuals.iter().map(|f| f.whitened_m()).collect();
     let mut deviations = vec![None; residuals_m.len()];
     for pairing in dataset.pairings() {
-        let rows: Vec<usize> = dataset.rows_of(pairing).collect();
+        let rows: Vec<usize> = dataset.rows_of(pairing).filter(|&row| residuals[row].weight > 0.0).collect();
         for (k, &row) in rows.iter().enumerate() {
             let window = rows[k.saturating_sub(NEIGHBOURS)..rows.len().min(k + NEIGHBOURS + 1)].iter();
             let around: Vec<f64> = window.filter(|&&other| other != row).map(|&other| residuals_m[other]).collect();

@@ -1,0 +1,71 @@
+//! An experiment that excites whatever can be excited: what is dependent there is dependent in every experiment.
+
+use ballbar::{Chain, Kinematics, LANES, LengthRows, Measurement, Pairing, Vector3};
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::pivoting::PivotedColumns;
+use super::spectrum::{RANK_THRESHOLD, column_scales};
+use crate::model::JointLimits;
+
+/// Random poses within the limits, random pairings of three chucks and three spheres.
+#[derive(Clone, Debug)]
+pub(super) struct Reference {
+    measurements: Vec<Measurement<f64>>,
+}
+
+impl Reference {
+    /// Of a chain: the same poses for every way to write it.
+    pub(super) fn new(chain: &Chain<f64>, limits: &[JointLimits]) -> Self {
+        const ROWS_PER_PARAMETER: usize = 4;
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let mut point = |reach_m: f64| Vector3::from_fn(|_, _| rng.random_range(-reach_m..reach_m));
+        let chucks: [Vector3<f64>; 3] = std::array::from_fn(|_| point(1.0));
+        let spheres: [Vector3<f64>; 3] = std::array::from_fn(|_| point(0.2));
+        let measurement = |i: usize| {
+            let q: Vec<f64> = limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
+            let pairing = Pairing { chuck_base_m: chucks[i % 3], sphere_tool_m: spheres[i / 3 % 3] };
+            let q = chain.joint_vector(&q).ok()?;
+            Some(Measurement::new(pairing, q, 0.0))
+        };
+        Self { measurements: (0..ROWS_PER_PARAMETER * chain.parameter_count()).filter_map(measurement).collect() }
+    }
+
+    /// `∂computed/∂parameter` of all parameters of a chain, a row a pose.
+    pub(super) fn jacobian(&self, chain: &Chain<f64>) -> DMatrix<f64> {
+        let kinematics = Kinematics::new(chain);
+        let mut swept = LengthRows::default();
+        let mut jacobian = DMatrix::zeros(self.measurements.len(), chain.parameter_count());
+        for (block, measurements) in self.measurements.chunks(LANES).enumerate() {
+            swept.compute(&kinematics, measurements);
+            for (index, mut column) in jacobian.column_iter_mut().enumerate() {
+                let lanes = swept.chain(index).iter().take(measurements.len());
+                lanes.enumerate().for_each(|(lane, &value)| column[block * LANES + lane] = value);
+            }
+        }
+        jacobian
+    }
+}
+
+/// A largest independent subset of the columns at `groups` (which together name each index at most once), ascending: as many as possible
+/// of the first group, then of the next after what those before it explain. In each group in the order of what the scaled columns add.
+pub(super) fn independent_columns(groups: &[Vec<usize>], jacobian: &DMatrix<f64>, rank: usize) -> Vec<usize> {
+    let scales = column_scales(jacobian);
+    let scaled = |&index: &usize| jacobian.column(index) / scales[index];
+    let mut basis = DMatrix::zeros(jacobian.nrows(), 0);
+    let mut chosen: Vec<usize> = Vec::new();
+    for group in groups.iter().filter(|group| !group.is_empty()) {
+        let columns = DMatrix::from_columns(&group.iter().map(scaled).collect::<Vec<_>>());
+        let unexplained = &columns - &basis * basis.tr_mul(&columns);
+        // Scaled columns have unit norm, so pivots compare with 1.
+        let added = PivotedColumns::new(unexplained, RANK_THRESHOLD);
+        chosen.extend(added.order.iter().map(|&k| group[k]));
+        basis = DMatrix::from_fn(basis.nrows(), basis.ncols() + added.basis.ncols(), |row, column| {
+            column.checked_sub(basis.ncols()).map_or_else(|| basis[(row, column)], |beyond| added.basis[(row, beyond)])
+        });
+    }
+    chosen.truncate(rank);
+    chosen.sort_unstable();
+    chosen
+}
