@@ -6,6 +6,7 @@
 mod builtin;
 mod calibrated;
 mod csv_rows;
+mod edit;
 mod encoding;
 mod kind;
 mod numbers;

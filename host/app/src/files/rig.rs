@@ -7,9 +7,9 @@ use toml::Spanned;
 use toml_edit::DocumentMut;
 
 use super::builtin::RIGS;
+use super::edit::set_numbers;
 use super::numbers::{Range, deserialize, in_range, vector};
 use super::problem::Problem;
-use super::robot::set_numbers;
 use super::solids::SolidsToml;
 use super::source::{InputError, Source};
 use crate::units::{m_from_mm, mm_from_m};

@@ -12,6 +12,7 @@ use toml::Spanned;
 use toml_edit::{DocumentMut, Item, Table, value};
 
 use super::builtin::ROBOTS;
+use super::edit::{set_number, set_numbers};
 use super::numbers::{Range as Of, deserialize, in_range, vector};
 use super::problem::{Problem, short};
 use super::robot_terms::{BodyToml, JointTermsToml, TermsReader, eccentricity, set_terms};
@@ -366,23 +367,6 @@ impl JointReader<'_> {
 
 /// A key of the file and what stands there.
 type Key<'a> = (&'static str, &'a Option<Spanned<f64>>);
-
-/// Replaces a number and keeps the comment behind it.
-pub(super) fn set_number(item: &mut Item, number: f64) {
-    let decor = item.as_value().map(|old| old.decor().clone());
-    *item = value(number);
-    if let (Some(new), Some(decor)) = (item.as_value_mut(), decor) {
-        *new.decor_mut() = decor;
-    }
-}
-
-pub(super) fn set_numbers(item: &mut Item, numbers: impl Iterator<Item = f64>) {
-    if let Some(array) = item.as_array_mut() {
-        for (i, number) in numbers.enumerate() {
-            array.replace(i, number);
-        }
-    }
-}
 
 /// Stands at the top of a calibrated robot's file.
 const CALIBRATED_NOTE: &str =

@@ -7,9 +7,9 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml_edit::{Array, Item};
 
+use super::edit::set_number;
 use super::numbers::{Range as Of, in_range, vector};
 use super::problem::Problem;
-use super::robot::set_number;
 use super::source::{InputError, Source};
 use crate::units::{ScreenUnit, m_from_mm};
 

@@ -20,8 +20,8 @@ use ballbar::{Chain, Joint, JointKind, JointTerms, Matrix3, PARAMETERS_PER_JOINT
 use nalgebra::DMatrix;
 
 use self::returning::UserFrames;
+use super::axis::Axis;
 use super::frames::{compose, from_link, inverse, link_angles, link_angles_about};
-use super::skeleton::Axis;
 
 /// A robot in canonical frames, and the way back to the frames it was written in.
 ///

@@ -17,9 +17,9 @@ use ballbar::{Chain, JointKind, Kinematics, Matrix3, Pose, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::axis::Axis;
 use super::canonical::AtZero;
 use super::frames::{apart, compose, from_link, inverse};
-use super::skeleton::Axis;
 use crate::model::JointLimits;
 
 /// Below this angle, radians, axes are taken as parallel: what a file's decimals leave of a right angle.

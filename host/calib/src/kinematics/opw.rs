@@ -8,8 +8,9 @@ use rs_opw_kinematics::kinematic_traits::{Kinematics as _, Pose as OpwPose};
 use rs_opw_kinematics::kinematics_impl::OPWKinematics;
 use rs_opw_kinematics::parameters::opw_kinematics::Parameters;
 
+use super::axis::Axis;
 use super::frames::compose;
-use super::skeleton::{Axis, Skeleton};
+use super::skeleton::Skeleton;
 
 const JOINTS: usize = 6;
 

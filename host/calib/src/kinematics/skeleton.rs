@@ -2,6 +2,7 @@
 
 use ballbar::{Approach, Chain, Joint, JointKind, JointTerms, JointVector, Kinematics, MAX_JOINTS, Matrix3, Pose, Vector3};
 
+use super::axis::Axis;
 use super::canonical::CanonicalFrames;
 use super::frames::from_link;
 use crate::model::Robot;
@@ -23,37 +24,6 @@ struct LinkTransform {
     rotation: Matrix3<f64>,
     /// Where the link's end comes to the next axis, by its height along that above the next origin; zero before the tool.
     end_height_m: f64,
-}
-
-/// A joint's axis in the base frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axis {
-    /// Revolute or prismatic.
-    pub kind: JointKind,
-    /// A point of the axis, metres.
-    pub point_m: Vector3<f64>,
-    /// Unit vector that the joint turns about or slides along.
-    pub direction: Vector3<f64>,
-    /// Joint value per encoder output.
-    pub scale: f64,
-}
-
-impl Axis {
-    /// `∂point/∂q` of a point behind the joint, base frame: metres per radian or metre.
-    pub fn point_column(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
-        match self.kind {
-            JointKind::Revolute => self.direction.cross(&(point_m - self.point_m)) * self.scale,
-            JointKind::Prismatic => self.direction * self.scale,
-        }
-    }
-
-    /// How fast what is behind the joint turns with `q`, base frame: radians per radian, or zero.
-    pub fn turn_column(&self) -> Vector3<f64> {
-        match self.kind {
-            JointKind::Revolute => self.direction * self.scale,
-            JointKind::Prismatic => Vector3::zeros(),
-        }
-    }
 }
 
 /// Where the links stand at one joint vector; base frame, metres. Links are counted from 0 at the base.
