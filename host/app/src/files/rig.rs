@@ -7,7 +7,7 @@ use toml::Spanned;
 use toml_edit::DocumentMut;
 
 use super::builtin::RIGS;
-use super::numbers::{Range, deserialize, in_range, vector};
+use super::numbers::{Range, deserialize, in_range, tolerance, vector};
 use super::problem::Problem;
 use super::robot::set_numbers;
 use super::solids::SolidsToml;
@@ -114,7 +114,7 @@ fn points(
 }
 
 fn tolerance_m(source: &Source, tolerance_mm: Option<&Spanned<f64>>) -> Result<Option<f64>, InputError> {
-    tolerance_mm.map(|mm| in_range(source, "tolerance_mm", mm, Range::Tolerance).map(m_from_mm)).transpose()
+    tolerance_mm.map(|mm| tolerance(source, "tolerance_mm", mm, Range::Tolerance).map(m_from_mm)).transpose()
 }
 
 /// Every chuck is paired with every sphere, and every length with both: what is searched and told grows with their product.
