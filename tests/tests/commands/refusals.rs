@@ -118,6 +118,11 @@ fn a_bad_rig_is_refused_with_its_line() {
             ("rig_bar_with_no_travel", "75.0", "0"),
             ("rig_tolerance_below_zero", "[[chucks]]", "tolerance_mm = -1\n\n[[chucks]]"),
             ("rig_sphere_tolerance_of_nan", "name = \"2\"\n", "name = \"2\"\ntolerance_mm = nan\n"),
+            ("rig_zero_tolerance_below_zero", "75.0\n", "75.0\nzero_tolerance_mm = -0.2\n"),
+            ("rig_zero_tolerance_of_a_rod_below_zero", "75.0\n", "75.0\nzero_tolerance_mm = [0.2, -0.2]\n"),
+            ("rig_zero_tolerances_of_three_rods", "75.0\n", "75.0\nzero_tolerance_mm = [0.2, 0.2, 0.2]\n"),
+            ("rig_zero_tolerance_of_words", "75.0\n", "75.0\nzero_tolerance_mm = \"0.2\"\n"),
+            ("rig_gain_tolerance_of_infinity", "75.0\n", "75.0\ngain_tolerance = inf\n"),
         ],
     );
 }

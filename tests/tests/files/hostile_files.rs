@@ -118,6 +118,14 @@ fn robot_with_tolerances() -> String {
     with(ROBOT, &changes)
 }
 
+/// A good rig that says of everything how well it is known.
+fn rig_with_tolerances() -> String {
+    let own = "name = \"B\"\ntolerance_mm = 2\n";
+    let bar = "travel_mm = 75.0\nzero_tolerance_mm = [0.2, 0]\ngain_tolerance = 2e-3\n";
+    let changes = [("[[chucks]]", "tolerance_mm = 0.1\n\n[[chucks]]"), ("name = \"B\"\n", own), ("travel_mm = 75.0\n", bar)];
+    with(RIG, &changes)
+}
+
 /// A good file of poses with every optional column.
 fn full_poses() -> String {
     let mut lines = POSES.lines();
@@ -163,18 +171,27 @@ fn a_mutant_of_a_robot_is_refused_or_has_sound_numbers_that_survive_a_rewrite() 
 
 #[test]
 fn a_mutant_of_a_rig_is_refused_or_has_points_with_names() {
+    let is_tolerance = |tolerance: &f64| tolerance.is_finite() && *tolerance >= 0.0;
     let is_sound = |rig: &Rig| {
         for points in [&rig.chucks, &rig.spheres] {
             assert!(!points.is_empty());
             for (i, point) in points.iter().enumerate() {
                 assert!(!point.name.is_empty() && point.position_m.iter().all(|metres| metres.is_finite()));
                 assert!(points[..i].iter().all(|other| other.name != point.name));
+                assert!(point.tolerance_m.iter().all(is_tolerance));
             }
         }
-        assert!(rig.bar.as_ref().is_none_or(|bar| bar.travel_m > 0.0 && bar.lengths_m.iter().all(|&length| length > 0.0)));
+        let Some(bar) = &rig.bar else { return };
+        assert!(bar.travel_m > 0.0 && bar.lengths_m.iter().all(|&length| length > 0.0));
+        assert!(
+            bar.zero_tolerances_m.iter().all(|zeros_m| zeros_m.len() == bar.lengths_m.len() && zeros_m.iter().all(is_tolerance))
+        );
+        assert!(bar.gain_tolerance.iter().all(is_tolerance));
     };
-    let taken = read_mutants(RIG, parse_rig, is_sound);
-    assert!(is_mixed(taken), "{taken} rigs taken: the mutants are too mild or too wild");
+    for text in [RIG, &rig_with_tolerances()] {
+        let taken = read_mutants(text, parse_rig, is_sound);
+        assert!(is_mixed(taken), "{taken} rigs taken: the mutants are too mild or too wild");
+    }
 }
 
 #[test]
@@ -239,7 +256,8 @@ fn a_mutant_of_targets_is_refused_or_has_sound_numbers() {
 fn the_command_shows_what_is_wrong_with_a_mutant_without_a_panic() {
     let mut rng = ChaCha8Rng::seed_from_u64(560);
     let args = ["validate", "--robot", "robot.toml", "--rig", "rig.toml", "poses.csv"];
-    for (file, text) in [("robot.toml", &*robot_with_tolerances()), ("rig.toml", RIG), ("poses.csv", &full_poses())] {
+    let (robot, rig) = (robot_with_tolerances(), rig_with_tolerances());
+    for (file, text) in [("robot.toml", &robot), ("rig.toml", &rig), ("poses.csv", &full_poses())] {
         let bench = Workbench::new();
         for _ in 0..100 {
             let bytes = mutant(&mut rng, text);

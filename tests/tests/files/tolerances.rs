@@ -1,14 +1,18 @@
-//! Tolerances of robots: what files say of them, what holds where they say nothing, and that edited files keep them.
+//! Tolerances of robots and rigs: what files say of them, what holds where they say nothing, and that edited files keep them.
 
 use std::fs;
 
-use ballbar_calib::model::{JointTolerance, LinkTolerance, Robot, Tolerances};
+use ballbar_calib::model::{JointTolerance, LinkTolerance, Rig, Robot, Tolerances};
 use ballbar_tests::shells::{puma, runs};
-use ballbar_tests::workbench::ROBOT;
-use host_cal::files::{ROBOTS, Source, open_robot, parse_robot};
+use ballbar_tests::workbench::{RIG, ROBOT};
+use host_cal::files::{RIGS, ROBOTS, Source, fitted_rig_toml, open_robot, parse_rig, parse_robot};
 
 fn robot(text: &str) -> Robot {
     parse_robot(&Source::new("arm.toml", text)).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+fn rig(text: &str) -> Rig {
+    parse_rig(&Source::new("rig.toml", text)).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 fn link(displacement_m: f64, rotation_deg: f64) -> LinkTolerance {
@@ -98,6 +102,43 @@ fn numbers_that_no_tolerance_can_be_are_refused_where_they_stand() {
     }
 }
 
+#[test]
+fn a_bar_is_known_once_for_all_rods_or_rod_by_rod() {
+    let bar = |lines: &str| rig(&format!("{RIG}{lines}\n")).bar.expect("a bar");
+    assert_eq!((bar("").zero_tolerances_m, bar("").gain_tolerance), (None, None));
+    assert_eq!(bar("zero_tolerance_mm = 0.25").zero_tolerances_m, Some(vec![0.25e-3, 0.25e-3]));
+    assert_eq!(bar("zero_tolerance_mm = 0").zero_tolerances_m, Some(vec![0.0, 0.0]));
+    assert_eq!(bar("zero_tolerance_mm = [0.5, 2]").zero_tolerances_m, Some(vec![0.5e-3, 2e-3]));
+    assert_eq!(bar("gain_tolerance = 2e-3").gain_tolerance, Some(2e-3));
+    for lines in [
+        "zero_tolerance_mm = []",
+        "zero_tolerance_mm = [0.5]",
+        "zero_tolerance_mm = [0.5, [0.5]]",
+        "zero_tolerance_mm = { rod = 460 }",
+        "zero_tolerance_mm = true",
+        "zero_tolerance_mm = 1e-9",
+        "zero_tolerance_mm = 18446744073709551616",
+        "zero_tolerance_mm = [nan, 0.1]",
+        "gain_tolerance = -1e-3",
+        "gain_tolerance = [1e-3]",
+    ] {
+        let error = parse_rig(&Source::new("rig.toml", &format!("{RIG}{lines}\n"))).expect_err(lines).to_string();
+        assert!(error.starts_with("rig.toml:20: "), "{error}");
+    }
+}
+
+#[test]
+fn a_rig_says_it_once_for_chucks_and_spheres_that_have_none_of_their_own() {
+    let text = format!("tolerance_mm = 0.1\n{}", RIG.replace("name = \"B\"", "name = \"B\"\ntolerance_mm = 0"));
+    let rig = rig(&text);
+    let tolerances_m: Vec<_> = rig.chucks.iter().chain(&rig.spheres).map(|point| point.tolerance_m).collect();
+    assert_eq!(tolerances_m, [Some(1e-4), Some(0.0), Some(1e-4), Some(1e-4)]);
+    for (_, text) in RIGS {
+        let bar = parse_rig(&Source::new("built in", text)).unwrap().bar;
+        assert!(bar.is_none_or(|bar| bar.zero_tolerances_m.is_none() && bar.gain_tolerance.is_none()));
+    }
+}
+
 /// A PUMA whose file says, in every place, how well it is known.
 fn puma_with_tolerances() -> String {
     let (_, text) = ROBOTS.iter().find(|(name, _)| *name == "puma560").expect("a built-in robot");
@@ -111,11 +152,15 @@ fn puma_with_tolerances() -> String {
 }
 
 #[test]
-fn calibrated_robots_keep_what_is_said() {
+fn calibrated_robots_and_fitted_rigs_keep_what_is_said() {
     let folder = puma();
     let before = puma_with_tolerances();
     fs::write(folder.path().join("arm.toml"), &before).unwrap();
-    let files = ["--robot", "arm.toml", "--rig", "triangles", "poses.csv"];
+    let (_, triangles) = RIGS.iter().find(|(name, _)| *name == "triangles").expect("a built-in rig");
+    let bar = "[bar]\nzero_tolerance_mm = [0.2, 0.3] # by gauge\ngain_tolerance = 1e-3\n";
+    let triangles = format!("tolerance_mm = 0.1\n{}", triangles.replace("[bar]\n", bar));
+    fs::write(folder.path().join("rig.toml"), &triangles).unwrap();
+    let files = ["--robot", "arm.toml", "--rig", "rig.toml", "poses.csv"];
     runs(&folder, &[&["fit"], &files, &["--out", "calibrated.toml"]]);
     let text = fs::read_to_string(folder.path().join("calibrated.toml")).unwrap();
     for line in
@@ -128,4 +173,11 @@ fn calibrated_robots_keep_what_is_said() {
     assert_eq!(robot(&text).tolerances, said);
     assert_eq!((said.links[0], said.links[1]), (link(20e-3, 1.0), link(2e-3, 0.5)));
     assert_eq!((said.joints[0].scale, said.joints[1]), (1.2e-3, joint(2_f64.to_radians(), 0.0)));
+
+    let mut found = rig(&triangles);
+    found.chucks[1].position_m.x += 1e-4;
+    let written = fitted_rig_toml(&Source::new("rig.toml", &triangles), &found).unwrap();
+    assert!(written.contains(bar), "{written}");
+    let again = rig(&written);
+    assert_eq!((again.bar, again.chucks[1].tolerance_m), (found.bar, Some(1e-4)));
 }

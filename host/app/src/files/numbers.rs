@@ -1,6 +1,10 @@
 //! TOML texts and the numbers in them, checked where they stand.
 
-use serde::Deserialize;
+use std::fmt;
+
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 use super::problem::{Problem, short};
@@ -17,6 +21,41 @@ pub(super) fn deserialize<T: for<'de> Deserialize<'de>>(source: &Source) -> Resu
             None => InputError::of_file(source.name(), problem),
         }
     })
+}
+
+/// A number for all of some things, or a list of one for each.
+pub(super) enum OneOrList {
+    One(f64),
+    List(Vec<Spanned<f64>>),
+}
+
+impl<'de> Deserialize<'de> for OneOrList {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // By hand, since serde's untagged enums lose the places of what they hold.
+        deserializer.deserialize_any(OneOrListVisitor)
+    }
+}
+
+struct OneOrListVisitor;
+
+impl<'de> Visitor<'de> for OneOrListVisitor {
+    type Value = OneOrList;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number or a list of numbers")
+    }
+
+    fn visit_f64<E>(self, number: f64) -> Result<OneOrList, E> {
+        Ok(OneOrList::One(number))
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<OneOrList, E> {
+        Ok(OneOrList::One(number as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<OneOrList, A::Error> {
+        Ok(OneOrList::List(Vec::deserialize(SeqAccessDeserializer::new(seq))?))
+    }
 }
 
 /// What a number of a file may be.

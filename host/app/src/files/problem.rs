@@ -115,6 +115,14 @@ pub enum Problem {
         /// What may stand there.
         expected: &'static str,
     },
+    /// A list of tolerances that is not that of the bar's lengths.
+    #[error("`zero_tolerance_mm` has {found} numbers, expected {lengths}, one for each of `lengths_mm`")]
+    RodTolerances {
+        /// How many stand there.
+        found: usize,
+        /// Lengths of the bar.
+        lengths: usize,
+    },
     /// The lower limit is not below the upper one.
     #[error("joint {joint}: the lower limit {min} is not below the upper limit {max}")]
     Limits {
@@ -349,6 +357,9 @@ impl Problem {
             Self::JointKeyMissing { .. } => "A joint needs type, offset, scale and both limits.",
             Self::Tolerance { .. } => {
                 "It is a standard deviation: 0 where the value is known exactly. Leave the key out where nobody says how well it is known."
+            }
+            Self::RodTolerances { .. } => {
+                "Where all are known alike, one number without brackets will do: zero_tolerance_mm = 0.2"
             }
             Self::NotANumber { .. } => "Write a plain decimal number with a point.",
             Self::Limits { .. } => "Limits are those of the encoder output q.",

@@ -7,7 +7,7 @@ use toml::Spanned;
 use toml_edit::DocumentMut;
 
 use super::builtin::RIGS;
-use super::numbers::{Range, deserialize, in_range, tolerance, vector};
+use super::numbers::{OneOrList, Range, deserialize, in_range, tolerance, vector};
 use super::problem::Problem;
 use super::robot::set_numbers;
 use super::solids::SolidsToml;
@@ -39,6 +39,8 @@ struct PointToml {
 struct BarToml {
     lengths_mm: Spanned<Vec<Spanned<f64>>>,
     travel_mm: Spanned<f64>,
+    zero_tolerance_mm: Option<Spanned<OneOrList>>,
+    gain_tolerance: Option<Spanned<f64>>,
 }
 
 /// Takes a built-in rig or reads a file.
@@ -130,8 +132,22 @@ fn read_bar(source: &Source, bar: &BarToml) -> Result<Bar, InputError> {
     }
     let lengths =
         bar.lengths_mm.as_ref().iter().map(|length| in_range(source, "lengths_mm", length, Range::Positive).map(m_from_mm));
+    let gain = |part| tolerance(source, "gain_tolerance", part, Range::PartTolerance);
     Ok(Bar {
         lengths_m: lengths.collect::<Result<_, _>>()?,
         travel_m: m_from_mm(in_range(source, "travel_mm", &bar.travel_mm, Range::Positive)?),
+        zero_tolerances_m: bar.zero_tolerance_mm.as_ref().map(|mm| zero_tolerances_m(source, bar, mm)).transpose()?,
+        gain_tolerance: bar.gain_tolerance.as_ref().map(gain).transpose()?,
     })
+}
+
+/// One for each length, also where the file says it once for all.
+fn zero_tolerances_m(source: &Source, bar: &BarToml, mm: &Spanned<OneOrList>) -> Result<Vec<f64>, InputError> {
+    let lengths = bar.lengths_mm.as_ref().len();
+    let metres = |mm: &Spanned<f64>| tolerance(source, "zero_tolerance_mm", mm, Range::Tolerance).map(m_from_mm);
+    match mm.as_ref() {
+        OneOrList::One(number) => Ok(vec![metres(&Spanned::new(mm.span(), *number))?; lengths]),
+        OneOrList::List(list) if list.len() == lengths => list.iter().map(metres).collect(),
+        OneOrList::List(list) => Err(InputError::at(source, mm.span(), Problem::RodTolerances { found: list.len(), lengths })),
+    }
 }
