@@ -3,6 +3,7 @@
 use std::fs;
 
 use ballbar_calib::model::{JointTolerance, LinkTolerance, Rig, Robot, Tolerances};
+use ballbar_tests::command::host_cal_in;
 use ballbar_tests::shells::{puma, runs};
 use ballbar_tests::workbench::{RIG, ROBOT};
 use host_cal::files::{RIGS, ROBOTS, Source, fitted_rig_toml, open_robot, parse_rig, parse_robot};
@@ -180,4 +181,21 @@ fn calibrated_robots_and_fitted_rigs_keep_what_is_said() {
     assert!(written.contains(bar), "{written}");
     let again = rig(&written);
     assert_eq!((again.bar, again.chucks[1].tolerance_m), (found.bar, Some(1e-4)));
+}
+
+#[test]
+fn an_exported_robot_says_how_well_it_is_known() {
+    let folder = tempfile::TempDir::new().unwrap();
+    fs::write(folder.path().join("arm.toml"), puma_with_tolerances()).unwrap();
+    let export = |format| host_cal_in(folder.path(), &["export", "--robot", "arm.toml", "--format", format]).stdout;
+    let document: serde_json::Value = serde_json::from_str(&export("json")).unwrap();
+    assert_eq!(document["links"][0]["tolerance_m"], 0.02);
+    assert_eq!(document["links"][6]["tolerance_rad"], 2_f64.to_radians());
+    assert_eq!(document["joints"][1]["offset_tolerance"], 2_f64.to_radians());
+    assert_eq!(
+        (&document["joints"][0]["scale_tolerance"], &document["joints"][1]["scale_tolerance"]),
+        (&1.2e-3.into(), &0.0.into())
+    );
+    let yaml = export("yaml");
+    assert!(yaml.contains("    tolerance_m: 0.02\n") && yaml.contains("    scale_tolerance: 0.0012\n"), "{yaml}");
 }
