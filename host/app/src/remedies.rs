@@ -77,6 +77,7 @@ impl Remedy for UnknownError {
         let (kind, why) = match self {
             Self::NoTolerance => (Kind::Rig, "no chuck or sphere that was measured with has a `tolerance_mm` above zero"),
             Self::NoRods => (Kind::BarGain, "neither rig nor poses say how long the bar is at mid travel"),
+            Self::KnownExactly(kind) => (*kind, "the rig's [bar] says with a tolerance of 0 that it is known exactly"),
             Self::NoMotion => (Kind::Latency, "no length was measured in motion"),
             Self::NoSets => (Kind::Sets, "no pose names a set"),
             Self::NoMasses => (Kind::Compliance, "the robot's file has no `mass_kg` that a joint bears"),
@@ -93,6 +94,8 @@ impl Remedy for UnknownError {
                 "Say in rig.toml how well the centres are known: `tolerance_mm` of a chuck or sphere, or once at the top for all."
             }
             Self::NoRods => "Give the rig a [bar] with `lengths_mm`, or the poses a column `bar_mm`.",
+            Self::KnownExactly(Kind::BarGain) => "Leave it out, or give the [bar] of rig.toml the `gain_tolerance` that it has.",
+            Self::KnownExactly(_) => "Leave it out, or give the [bar] of rig.toml the `zero_tolerance_mm` that it has.",
             Self::NoMotion => "Only poses that `host-cal collect` measures on the way tell it.",
             Self::NoSets => "Give the poses a column `set`.",
             Self::NoMasses => "Give links their `mass_kg` and `center_mm` in robot.toml, and the payload where there is one.",

@@ -67,7 +67,7 @@ fn rig() -> Result<Rig, Box<dyn Error>> {
         NamedPoint::new("2", [-0.029, 0.05, 0.05]),
         NamedPoint::new("3", [-0.029, -0.05, 0.05]),
     ];
-    Ok(Rig::new(chucks, spheres, Some(Bar { lengths_m: vec![0.46, 0.61], travel_m: 0.075 }))?)
+    Ok(Rig::new(chucks, spheres, Some(Bar::new(vec![0.46, 0.61], 0.075)))?)
 }
 
 /// One length, and where the arm stood.

@@ -61,7 +61,7 @@ pub fn triangles() -> Rig {
     let points = |points_mm: &[(&str, [f64; 3])]| {
         points_mm.iter().map(|(name, position_mm)| NamedPoint::new(*name, position_mm.map(m_from_mm))).collect()
     };
-    let bar = Bar { lengths_m: LENGTHS_MM.map(m_from_mm).to_vec(), travel_m: m_from_mm(TRAVEL_MM) };
+    let bar = Bar::new(LENGTHS_MM.map(m_from_mm).to_vec(), m_from_mm(TRAVEL_MM));
     #[expect(clippy::expect_used, reason = "a test sees that these constants are a rig")]
     Rig::new(points(&CHUCKS_MM), points(&SPHERES_MM), Some(bar)).expect("three named chucks and spheres")
 }

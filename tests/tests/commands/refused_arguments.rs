@@ -17,6 +17,15 @@ fn puma_bench() -> Workbench {
 }
 
 #[test]
+fn a_bar_that_the_rig_says_is_exact_is_no_unknown() {
+    let bench = Workbench::new();
+    bench.put("rig.toml", format!("{RIG}zero_tolerance_mm = 0\ngain_tolerance = 0\n"));
+    for (kind, name) in [("rod-zeros", "unknown_zeros_that_are_exact"), ("bar-gain", "unknown_gain_that_is_exact")] {
+        bench.refuses(name, &["fit", "--robot", "robot.toml", "--rig", "rig.toml", "poses.csv", "--unknown", kind]);
+    }
+}
+
+#[test]
 fn arguments_that_make_no_sense_are_refused() {
     const PUMA: [&str; 4] = ["--robot", "puma560", "--rig", "triangles"];
     let bench = puma_bench();

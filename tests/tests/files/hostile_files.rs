@@ -98,6 +98,34 @@ fn good() -> (Robot, Rig) {
     (parse_robot(&source(ROBOT)).expect("a good robot"), parse_rig(&source(RIG)).expect("a good rig"))
 }
 
+/// Puts text before or behind a place in a good file.
+fn with(text: &str, changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(text.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "the good file has no {from}");
+        text.replacen(from, to, 1)
+    })
+}
+
+/// A good robot that says of everything how well it is known.
+fn robot_with_tolerances() -> String {
+    let slide = "offset_mm = 10.0\n";
+    let changes = [
+        ("[[links]]", "[tolerances]\nlink_mm = 0.5\nlink_deg = 0.1\noffset_deg = 0.2\noffset_mm = 2\nscale = 1e-4\n\n[[links]]"),
+        ("rotation_deg = [0.0, 90.0, 0.0]\n", "rotation_deg = [0.0, 90.0, 0.0]\ntolerance_mm = 0.25\ntolerance_deg = 0\n"),
+        ("offset_deg = -90.0\n", "offset_deg = -90.0\ntolerance_deg = 0.75 # by eye\nscale_tolerance = 0\n"),
+        (slide, "offset_mm = 10.0\ntolerance_mm = 1.5\n"),
+    ];
+    with(ROBOT, &changes)
+}
+
+/// A good rig that says of everything how well it is known.
+fn rig_with_tolerances() -> String {
+    let own = "name = \"B\"\ntolerance_mm = 2\n";
+    let bar = "travel_mm = 75.0\nzero_tolerance_mm = [0.2, 0]\ngain_tolerance = 2e-3\n";
+    let changes = [("[[chucks]]", "tolerance_mm = 0.1\n\n[[chucks]]"), ("name = \"B\"\n", own), ("travel_mm = 75.0\n", bar)];
+    with(RIG, &changes)
+}
+
 /// A good file of poses with every optional column.
 fn full_poses() -> String {
     let mut lines = POSES.lines();
@@ -126,31 +154,44 @@ fn a_mutant_of_a_robot_is_refused_or_has_sound_numbers_that_survive_a_rewrite() 
         assert!(robot.chain.parameters().iter().all(|value| value.is_finite()));
         assert_eq!((robot.limits.len(), robot.encoders.len()), (robot.chain.joints(), robot.chain.joints()));
         assert!(robot.limits.iter().all(|limits| limits.min < limits.max));
+        assert!(robot.tolerances.are_of(robot.chain.joints()), "{:?}", robot.tolerances);
         let text = calibrated_toml(source, &robot.chain, &robot.terms, &calibration).expect("a file that was read can be edited");
         let again = parse_robot(&Source::new("rewritten", &text)).unwrap_or_else(|error| panic!("{error}\n{text}"));
         for (before, after) in robot.chain.parameters().iter().zip(again.chain.parameters()) {
             assert!((before - after).abs() <= 1e-12 * before.abs(), "{before} became {after}\n{text}");
         }
         assert_eq!(again.calibration.as_ref(), Some(&calibration));
+        assert_eq!(again.tolerances, robot.tolerances);
     };
-    let taken = read_mutants(ROBOT, |source| Ok((source.clone(), parse_robot(source)?)), is_sound);
-    assert!(is_mixed(taken), "{taken} robots taken: the mutants are too mild or too wild");
+    for text in [ROBOT, &robot_with_tolerances()] {
+        let taken = read_mutants(text, |source| Ok((source.clone(), parse_robot(source)?)), is_sound);
+        assert!(is_mixed(taken), "{taken} robots taken: the mutants are too mild or too wild");
+    }
 }
 
 #[test]
 fn a_mutant_of_a_rig_is_refused_or_has_points_with_names() {
+    let is_tolerance = |tolerance: &f64| tolerance.is_finite() && *tolerance >= 0.0;
     let is_sound = |rig: &Rig| {
         for points in [&rig.chucks, &rig.spheres] {
             assert!(!points.is_empty());
             for (i, point) in points.iter().enumerate() {
                 assert!(!point.name.is_empty() && point.position_m.iter().all(|metres| metres.is_finite()));
                 assert!(points[..i].iter().all(|other| other.name != point.name));
+                assert!(point.tolerance_m.iter().all(is_tolerance));
             }
         }
-        assert!(rig.bar.as_ref().is_none_or(|bar| bar.travel_m > 0.0 && bar.lengths_m.iter().all(|&length| length > 0.0)));
+        let Some(bar) = &rig.bar else { return };
+        assert!(bar.travel_m > 0.0 && bar.lengths_m.iter().all(|&length| length > 0.0));
+        assert!(
+            bar.zero_tolerances_m.iter().all(|zeros_m| zeros_m.len() == bar.lengths_m.len() && zeros_m.iter().all(is_tolerance))
+        );
+        assert!(bar.gain_tolerance.iter().all(is_tolerance));
     };
-    let taken = read_mutants(RIG, parse_rig, is_sound);
-    assert!(is_mixed(taken), "{taken} rigs taken: the mutants are too mild or too wild");
+    for text in [RIG, &rig_with_tolerances()] {
+        let taken = read_mutants(text, parse_rig, is_sound);
+        assert!(is_mixed(taken), "{taken} rigs taken: the mutants are too mild or too wild");
+    }
 }
 
 #[test]
@@ -215,7 +256,8 @@ fn a_mutant_of_targets_is_refused_or_has_sound_numbers() {
 fn the_command_shows_what_is_wrong_with_a_mutant_without_a_panic() {
     let mut rng = ChaCha8Rng::seed_from_u64(560);
     let args = ["validate", "--robot", "robot.toml", "--rig", "rig.toml", "poses.csv"];
-    for (file, text) in [("robot.toml", ROBOT), ("rig.toml", RIG), ("poses.csv", &full_poses())] {
+    let (robot, rig) = (robot_with_tolerances(), rig_with_tolerances());
+    for (file, text) in [("robot.toml", &robot), ("rig.toml", &rig), ("poses.csv", &full_poses())] {
         let bench = Workbench::new();
         for _ in 0..100 {
             let bytes = mutant(&mut rng, text);

@@ -6,3 +6,4 @@ mod hostile_names;
 mod odd_files;
 mod protected_files;
 mod robot_terms;
+mod tolerances;

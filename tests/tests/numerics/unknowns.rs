@@ -39,7 +39,7 @@ fn experiment(robot: &str, seed: u64) -> (Robot, Rig, Dataset) {
     };
     let (mut chucks, spheres) = (ends(["A", "B", "C"], 1.0), ends(["1", "2", "3"], 0.2));
     chucks[0].tolerance_m = Some(0.0);
-    let bar = Bar { lengths_m: vec![0.46, 0.61], travel_m: 0.075 };
+    let bar = Bar::new(vec![0.46, 0.61], 0.075);
     let rig = Rig::new(chucks.into(), spheres.into(), Some(bar)).unwrap();
     let mut row = |i: usize| {
         let mut q = JointVector::zero();
@@ -142,6 +142,49 @@ fn each_kind_asks_for_what_it_is_made_of() {
     for kind in Kind::ALL {
         assert_eq!(Kind::named(kind.name()), Some(kind));
     }
+}
+
+#[test]
+fn a_bar_counts_as_known_within_its_tolerances_and_is_no_unknown_where_it_is_exact() {
+    let puma = Puma::default();
+    let mut dataset = puma.shells(0.46, 10, 0.0, 1);
+    dataset.rows.extend(puma.shells(0.61, 10, 0.0, 2).rows);
+    dataset.rows.iter_mut().filter(|row| row.bar_m == Some(0.61)).for_each(|row| row.measurement.length_m += 0.5e-3);
+    let rig = |zero_tolerances_m: Option<[f64; 2]>, gain_tolerance| {
+        let zero_tolerances_m = zero_tolerances_m.map(Vec::from);
+        let bar = Bar { zero_tolerances_m, gain_tolerance, ..Bar::new(vec![0.46, 0.61], 0.075) };
+        Rig { bar: Some(bar), ..puma.rig.clone() }
+    };
+    let list = |kind: Kind, rig: &Rig| -> Result<Vec<(String, Option<f64>)>, UnknownError> {
+        let blocks = vec![kind.block(&puma.design, rig, &dataset)?];
+        let unknowns = Unknowns::new(&puma.design.chain, &puma.design.terms, blocks);
+        let own = unknowns.list()[puma.design.chain.parameters().len()..].iter();
+        Ok(own.map(|unknown| (unknown.name.clone(), unknown.tolerance)).collect())
+    };
+    let named = |unknowns: &[(&str, Option<f64>)]| {
+        Ok(unknowns.iter().map(|&(name, tolerance)| (name.to_owned(), tolerance)).collect::<Vec<_>>())
+    };
+    let [nothing, known] = [rig(None, None), rig(Some([2e-4, 5e-4]), Some(1e-3))];
+    assert_eq!(list(Kind::BarZero, &nothing), named(&[("bar-zero", None)]));
+    assert_eq!(list(Kind::RodZeros, &nothing), named(&[("rod-zero 460", None), ("rod-zero 610", None)]));
+    assert_eq!(list(Kind::BarGain, &nothing), named(&[("bar-gain", None)]));
+    assert_eq!(list(Kind::BarZero, &known), named(&[("bar-zero", Some(5e-4))]));
+    assert_eq!(list(Kind::RodZeros, &known), named(&[("rod-zero 460", Some(2e-4)), ("rod-zero 610", Some(5e-4))]));
+    assert_eq!(list(Kind::BarGain, &known), named(&[("bar-gain", Some(1e-3))]));
+    let half = rig(Some([0.0, 5e-4]), None);
+    assert_eq!(list(Kind::RodZeros, &half), named(&[("rod-zero 610", Some(5e-4))]));
+    let exact = rig(Some([0.0, 0.0]), Some(0.0));
+    for kind in [Kind::BarZero, Kind::RodZeros, Kind::BarGain] {
+        assert_eq!(list(kind, &exact), Err(UnknownError::KnownExactly(kind)));
+    }
+
+    // The longer rod is 0.5 mm off, and the only one that may be.
+    let zero_m = |rig: &Rig| {
+        let unknowns = vec![Kind::RodZeros.block(&puma.design, rig, &dataset).unwrap()];
+        let found = fit(&puma.design, &dataset, &FitOptions { unknowns, ..FitOptions::default() }).unwrap();
+        found.parameters.last().unwrap().fitted
+    };
+    assert!((zero_m(&half) - 0.5e-3).abs() < 1e-6, "{}", zero_m(&half));
 }
 
 /// The zero is found as well as its deviation says, and the tool as well as if nothing had been wrong.

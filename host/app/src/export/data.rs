@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use ballbar::{JointKind, Parameter};
-use ballbar_calib::model::Robot;
+use ballbar_calib::model::{JointLimits, JointTolerance, LinkTolerance, Robot};
 use serde::Serialize;
 
 use super::{MODEL, model_lines, origin};
@@ -25,16 +25,22 @@ struct LinkData {
     alpha_rad: f64,
     beta_rad: f64,
     gamma_rad: f64,
+    /// Of each coordinate of the translation.
+    tolerance_m: f64,
+    /// Of each component of the rotation vector.
+    tolerance_rad: f64,
 }
 
 #[derive(Serialize)]
 struct JointData {
     #[serde(rename = "type")]
     kind: &'static str,
-    /// Of offset and limits.
+    /// Of offset, its tolerance and limits.
     unit: &'static str,
     offset: f64,
     scale: f64,
+    offset_tolerance: f64,
+    scale_tolerance: f64,
     min: f64,
     max: f64,
 }
@@ -42,25 +48,37 @@ struct JointData {
 impl<'a> RobotData<'a> {
     fn new(robot: &'a Robot) -> Self {
         let chain = &robot.chain;
-        let link = |link: ballbar::Link<f64>| LinkData {
+        let link = |(link, tolerance): (ballbar::Link<f64>, &LinkTolerance)| LinkData {
             translation_m: link.translation_m.into(),
             alpha_rad: link.alpha_rad,
             beta_rad: link.beta_rad,
             gamma_rad: link.gamma_rad,
+            tolerance_m: tolerance.displacement_m,
+            tolerance_rad: tolerance.rotation_rad,
         };
-        let joints = (0..chain.joints()).filter_map(|i| chain.joint(i)).zip(&robot.limits);
-        let joint = |(joint, limits): (ballbar::Joint<f64>, &ballbar_calib::model::JointLimits)| {
+        let joint = |((joint, limits), tolerance): ((ballbar::Joint<f64>, &JointLimits), &JointTolerance)| {
             let (kind, unit) = match joint.kind {
                 JointKind::Revolute => ("revolute", "rad"),
                 JointKind::Prismatic => ("prismatic", "m"),
             };
-            JointData { kind, unit, offset: joint.offset, scale: joint.scale, min: limits.min, max: limits.max }
+            JointData {
+                kind,
+                unit,
+                offset: joint.offset,
+                scale: joint.scale,
+                offset_tolerance: tolerance.offset,
+                scale_tolerance: tolerance.scale,
+                min: limits.min,
+                max: limits.max,
+            }
         };
+        let links = (0..=chain.joints()).filter_map(|i| chain.link(i)).zip(&robot.tolerances.links);
+        let joints = (0..chain.joints()).filter_map(|i| chain.joint(i)).zip(&robot.limits).zip(&robot.tolerances.joints);
         Self {
             name: &robot.name,
             is_calibrated: robot.standing().is_calibrated(),
             model: MODEL,
-            links: (0..=chain.joints()).filter_map(|i| chain.link(i)).map(link).collect(),
+            links: links.map(link).collect(),
             joints: joints.map(joint).collect(),
         }
     }
@@ -77,14 +95,27 @@ pub(super) fn yaml(robot: &Robot) -> String {
     let _ = writeln!(text, "is_calibrated: {}\nmodel: {}\nlinks:", data.is_calibrated, quoted(data.model));
     for link in &data.links {
         let _ = writeln!(text, "  - translation_m: [{}]", link.translation_m.map(yaml_number).join(", "));
-        for (key, value) in [("alpha_rad", link.alpha_rad), ("beta_rad", link.beta_rad), ("gamma_rad", link.gamma_rad)] {
+        for (key, value) in [
+            ("alpha_rad", link.alpha_rad),
+            ("beta_rad", link.beta_rad),
+            ("gamma_rad", link.gamma_rad),
+            ("tolerance_m", link.tolerance_m),
+            ("tolerance_rad", link.tolerance_rad),
+        ] {
             let _ = writeln!(text, "    {key}: {}", yaml_number(value));
         }
     }
     text += "joints:\n";
     for joint in &data.joints {
         let _ = writeln!(text, "  - type: {}\n    unit: {}", joint.kind, joint.unit);
-        for (key, value) in [("offset", joint.offset), ("scale", joint.scale), ("min", joint.min), ("max", joint.max)] {
+        for (key, value) in [
+            ("offset", joint.offset),
+            ("scale", joint.scale),
+            ("offset_tolerance", joint.offset_tolerance),
+            ("scale_tolerance", joint.scale_tolerance),
+            ("min", joint.min),
+            ("max", joint.max),
+        ] {
             let _ = writeln!(text, "    {key}: {}", yaml_number(value));
         }
     }

@@ -19,6 +19,7 @@ mod reading;
 mod rig;
 mod robot;
 mod robot_terms;
+mod robot_tolerances;
 pub mod session_names;
 mod solids;
 mod source;

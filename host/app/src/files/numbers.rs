@@ -1,6 +1,10 @@
 //! TOML texts and the numbers in them, checked where they stand.
 
-use serde::Deserialize;
+use std::fmt;
+
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 use super::problem::{Problem, short};
@@ -19,6 +23,41 @@ pub(super) fn deserialize<T: for<'de> Deserialize<'de>>(source: &Source) -> Resu
     })
 }
 
+/// A number for all of some things, or a list of one for each.
+pub(super) enum OneOrList {
+    One(f64),
+    List(Vec<Spanned<f64>>),
+}
+
+impl<'de> Deserialize<'de> for OneOrList {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // By hand, since serde's untagged enums lose the places of what they hold.
+        deserializer.deserialize_any(OneOrListVisitor)
+    }
+}
+
+struct OneOrListVisitor;
+
+impl<'de> Visitor<'de> for OneOrListVisitor {
+    type Value = OneOrList;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number or a list of numbers")
+    }
+
+    fn visit_f64<E>(self, number: f64) -> Result<OneOrList, E> {
+        Ok(OneOrList::One(number))
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<OneOrList, E> {
+        Ok(OneOrList::One(number as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<OneOrList, A::Error> {
+        Ok(OneOrList::List(Vec::deserialize(SeqAccessDeserializer::new(seq))?))
+    }
+}
+
 /// What a number of a file may be.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Range {
@@ -29,8 +68,10 @@ pub(super) enum Range {
     Positive,
     /// A standard deviation in millimetres: a nanometre to a kilometre.
     Deviation,
-    /// A standard deviation in millimetres, or zero.
+    /// A standard deviation in millimetres or degrees, or zero.
     Tolerance,
+    /// A standard deviation of a part, such as a scale's, or zero.
+    PartTolerance,
     /// A mass in kilograms.
     Mass,
     /// A joint's scale.
@@ -52,6 +93,7 @@ impl Range {
             Self::Positive => x > 0.0 && x <= MOST,
             Self::Deviation => (1e-6..=MOST).contains(&x),
             Self::Tolerance => x == 0.0 || Self::Deviation.contains(x),
+            Self::PartTolerance => x == 0.0 || (1e-9..=1e3).contains(&x),
             Self::Mass => (0.0..=1e5).contains(&x),
             Self::Scale => (1e-3..=1e3).contains(&x.abs()),
             Self::Counts => x > 0.0 && x <= 1e12,
@@ -67,6 +109,7 @@ impl Range {
             Self::Positive => "a number above 0, at most 1e6",
             Self::Deviation => "a number from 1e-6 to 1e6",
             Self::Tolerance => "0, or a number from 1e-6 to 1e6",
+            Self::PartTolerance => "0, or a number from 1e-9 to 1e3",
             Self::Mass => "a number from 0 to 1e5",
             Self::Scale => "a number of size 0.001 to 1000",
             Self::Counts => "a number above 0, at most 1e12",
@@ -93,5 +136,16 @@ pub(super) fn in_range(source: &Source, field: &str, number: &Spanned<f64>, rang
         return Ok(found);
     }
     let problem = Problem::Number { field: field.to_owned(), found: found.to_string(), expected: range.words() };
+    Err(InputError::at(source, number.span(), problem))
+}
+
+/// A tolerance in a range of tolerances.
+pub(super) fn tolerance(source: &Source, field: &'static str, number: &Spanned<f64>, range: Range) -> Result<f64, InputError> {
+    let found = *number.as_ref();
+    if range.contains(found) {
+        // Zero with a minus before it is zero.
+        return Ok(found.abs());
+    }
+    let problem = Problem::Tolerance { field, found: found.to_string(), expected: range.words() };
     Err(InputError::at(source, number.span(), problem))
 }

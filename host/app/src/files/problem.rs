@@ -105,6 +105,24 @@ pub enum Problem {
         /// What may stand there.
         expected: &'static str,
     },
+    /// A tolerance that none can be.
+    #[error("`{field}` is {found}, expected {expected}")]
+    Tolerance {
+        /// The key.
+        field: &'static str,
+        /// What stands there.
+        found: String,
+        /// What may stand there.
+        expected: &'static str,
+    },
+    /// A list of tolerances that is not that of the bar's lengths.
+    #[error("`zero_tolerance_mm` has {found} numbers, expected {lengths}, one for each of `lengths_mm`")]
+    RodTolerances {
+        /// How many stand there.
+        found: usize,
+        /// Lengths of the bar.
+        lengths: usize,
+    },
     /// The lower limit is not below the upper one.
     #[error("joint {joint}: the lower limit {min} is not below the upper limit {max}")]
     Limits {
@@ -337,6 +355,12 @@ impl Problem {
             Self::JointCount { .. } | Self::LinkCount { .. } => "A chain is link 1, joint 1, link 2, … joint J, link J+1.",
             Self::JointUnit { .. } | Self::ColumnUnit { .. } => "Angles are in degrees (`_deg`), slides in millimetres (`_mm`).",
             Self::JointKeyMissing { .. } => "A joint needs type, offset, scale and both limits.",
+            Self::Tolerance { .. } => {
+                "It is a standard deviation: 0 where the value is known exactly. Leave the key out where nobody says how well it is known."
+            }
+            Self::RodTolerances { .. } => {
+                "Where all are known alike, one number without brackets will do: zero_tolerance_mm = 0.2"
+            }
             Self::NotANumber { .. } => "Write a plain decimal number with a point.",
             Self::Limits { .. } => "Limits are those of the encoder output q.",
             Self::Terms(TermsError::NoLoad { .. }) => {

@@ -8,7 +8,7 @@ use toml_edit::DocumentMut;
 
 use super::builtin::RIGS;
 use super::edit::set_numbers;
-use super::numbers::{Range, deserialize, in_range, vector};
+use super::numbers::{OneOrList, Range, deserialize, in_range, tolerance, vector};
 use super::problem::Problem;
 use super::solids::SolidsToml;
 use super::source::{InputError, Source};
@@ -39,6 +39,8 @@ struct PointToml {
 struct BarToml {
     lengths_mm: Spanned<Vec<Spanned<f64>>>,
     travel_mm: Spanned<f64>,
+    zero_tolerance_mm: Option<Spanned<OneOrList>>,
+    gain_tolerance: Option<Spanned<f64>>,
 }
 
 /// Takes a built-in rig or reads a file.
@@ -114,7 +116,7 @@ fn points(
 }
 
 fn tolerance_m(source: &Source, tolerance_mm: Option<&Spanned<f64>>) -> Result<Option<f64>, InputError> {
-    tolerance_mm.map(|mm| in_range(source, "tolerance_mm", mm, Range::Tolerance).map(m_from_mm)).transpose()
+    tolerance_mm.map(|mm| tolerance(source, "tolerance_mm", mm, Range::Tolerance).map(m_from_mm)).transpose()
 }
 
 /// Every chuck is paired with every sphere, and every length with both: what is searched and told grows with their product.
@@ -130,8 +132,22 @@ fn read_bar(source: &Source, bar: &BarToml) -> Result<Bar, InputError> {
     }
     let lengths =
         bar.lengths_mm.as_ref().iter().map(|length| in_range(source, "lengths_mm", length, Range::Positive).map(m_from_mm));
+    let gain = |part| tolerance(source, "gain_tolerance", part, Range::PartTolerance);
     Ok(Bar {
         lengths_m: lengths.collect::<Result<_, _>>()?,
         travel_m: m_from_mm(in_range(source, "travel_mm", &bar.travel_mm, Range::Positive)?),
+        zero_tolerances_m: bar.zero_tolerance_mm.as_ref().map(|mm| zero_tolerances_m(source, bar, mm)).transpose()?,
+        gain_tolerance: bar.gain_tolerance.as_ref().map(gain).transpose()?,
     })
+}
+
+/// One for each length, also where the file says it once for all.
+fn zero_tolerances_m(source: &Source, bar: &BarToml, mm: &Spanned<OneOrList>) -> Result<Vec<f64>, InputError> {
+    let lengths = bar.lengths_mm.as_ref().len();
+    let metres = |mm: &Spanned<f64>| tolerance(source, "zero_tolerance_mm", mm, Range::Tolerance).map(m_from_mm);
+    match mm.as_ref() {
+        OneOrList::One(number) => Ok(vec![metres(&Spanned::new(mm.span(), *number))?; lengths]),
+        OneOrList::List(list) if list.len() == lengths => list.iter().map(metres).collect(),
+        OneOrList::List(list) => Err(InputError::at(source, mm.span(), Problem::RodTolerances { found: list.len(), lengths })),
+    }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use ballbar::{Chain, Coupling, Encoder, JointKind, JointTerms, MAX_JOINTS};
-use ballbar_calib::model::{Calibration, EncoderFacts, JointLimits, Robot, Tolerances};
+use ballbar_calib::model::{Calibration, EncoderFacts, JointLimits, JointTolerance, Robot};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -16,6 +16,7 @@ use super::edit::{set_number, set_numbers};
 use super::numbers::{Range as Of, deserialize, in_range, vector};
 use super::problem::{Problem, short};
 use super::robot_terms::{BodyToml, JointTermsToml, TermsReader, eccentricity, set_terms};
+use super::robot_tolerances::{TolerancesToml, set_joint, set_link};
 use super::source::{InputError, Source};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, tidy};
@@ -31,6 +32,8 @@ struct RobotToml {
     joints: Vec<Spanned<JointToml>>,
     gravity: Option<Spanned<Vec<Spanned<f64>>>>,
     payload: Option<Spanned<BodyToml>>,
+    #[serde(default)]
+    tolerances: TolerancesToml,
     calibration: Option<Calibration>,
 }
 
@@ -39,6 +42,8 @@ struct RobotToml {
 struct LinkToml {
     translation_mm: Spanned<Vec<Spanned<f64>>>,
     rotation_deg: Spanned<Vec<Spanned<f64>>>,
+    tolerance_mm: Option<Spanned<f64>>,
+    tolerance_deg: Option<Spanned<f64>>,
     mass_kg: Option<Spanned<f64>>,
     center_mm: Option<Spanned<Vec<Spanned<f64>>>>,
 }
@@ -51,6 +56,10 @@ struct JointToml {
     offset_deg: Option<Spanned<f64>>,
     offset_mm: Option<Spanned<f64>>,
     scale: Spanned<f64>,
+    /// Of the offset.
+    tolerance_deg: Option<Spanned<f64>>,
+    tolerance_mm: Option<Spanned<f64>>,
+    scale_tolerance: Option<Spanned<f64>>,
     min_deg: Option<Spanned<f64>>,
     max_deg: Option<Spanned<f64>>,
     min_mm: Option<Spanned<f64>>,
@@ -109,6 +118,15 @@ enum KindToml {
     Prismatic,
 }
 
+impl From<KindToml> for JointKind {
+    fn from(kind: KindToml) -> Self {
+        match kind {
+            KindToml::Revolute => Self::Revolute,
+            KindToml::Prismatic => Self::Prismatic,
+        }
+    }
+}
+
 /// Takes a built-in robot or reads a file.
 ///
 /// # Errors
@@ -140,8 +158,9 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
         return Err(of_file(Problem::LinkCount { found: file.links.len(), expected: joints + 1, joints }));
     }
 
+    let kinds: Vec<JointKind> = file.joints.iter().map(|joint| joint.as_ref().kind.into()).collect();
+    let mut tolerances = file.tolerances.of_robot(source, &kinds)?;
     let mut parameters = Vec::new();
-    let mut kinds = Vec::new();
     let mut limits = Vec::new();
     let mut encoders = Vec::new();
     let mut terms = TermsReader::new(source);
@@ -149,11 +168,12 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
         terms.link(i, &link.mass_kg, &link.center_mm)?;
         parameters.extend(vector(source, "translation_mm", &link.translation_mm)?.map(m_from_mm));
         parameters.extend(vector(source, "rotation_deg", &link.rotation_deg)?.map(f64::to_radians));
+        let known = ("tolerance_mm", &link.tolerance_mm);
+        set_link(source, &mut tolerances.links[i], known, ("tolerance_deg", &link.tolerance_deg))?;
         if let Some(joint) = file.joints.get(i) {
             let reader = JointReader { source, number: i + 1, span: joint.span(), joint: joint.as_ref() };
-            let (kind, offset, scale) = reader.model()?;
-            kinds.push(kind);
-            parameters.extend([offset, scale]);
+            parameters.extend(reader.offset_and_scale()?);
+            reader.set_tolerance(&mut tolerances.joints[i])?;
             limits.push(reader.limits()?);
             encoders.push(reader.encoder()?);
             terms.joint(i, &reader.terms()?);
@@ -165,7 +185,6 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
         Some(name) => robot_name(source, name)?,
         None => one_line(source.name()).into_owned(),
     };
-    let tolerances = Tolerances::usual(chain.joint_kinds());
     Ok(Robot {
         name,
         source: source.name().to_owned(),
@@ -229,17 +248,29 @@ struct JointReader<'a> {
 
 impl JointReader<'_> {
     fn kind(&self) -> (JointKind, &'static str) {
-        match self.joint.kind {
-            KindToml::Revolute => (JointKind::Revolute, "revolute"),
-            KindToml::Prismatic => (JointKind::Prismatic, "prismatic"),
+        let kind = JointKind::from(self.joint.kind);
+        match kind {
+            JointKind::Revolute => (kind, "revolute"),
+            JointKind::Prismatic => (kind, "prismatic"),
         }
     }
 
-    fn model(&self) -> Result<(JointKind, f64, f64), InputError> {
+    fn offset_and_scale(&self) -> Result<[f64; 2], InputError> {
         let joint = self.joint;
         let (_, offset) = self.value("offset", ("offset_deg", &joint.offset_deg), ("offset_mm", &joint.offset_mm))?;
-        let scale = in_range(self.source, "scale", &joint.scale, Of::Scale)?;
-        Ok((self.kind().0, offset, scale))
+        Ok([offset, in_range(self.source, "scale", &joint.scale, Of::Scale)?])
+    }
+
+    /// Takes what the joint says of its own.
+    fn set_tolerance(&self, tolerance: &mut JointTolerance) -> Result<(), InputError> {
+        let joint = self.joint;
+        let (deg, mm) = (("tolerance_deg", &joint.tolerance_deg), ("tolerance_mm", &joint.tolerance_mm));
+        let (offset, (_, other)) = self.by_kind(deg, mm);
+        if let Some(other) = other {
+            return Err(self.wrong_unit(other.span(), deg.0, mm.0));
+        }
+        let unit = ScreenUnit::from(self.kind().0);
+        set_joint(self.source, tolerance, unit, offset, ("scale_tolerance", &joint.scale_tolerance))
     }
 
     fn limits(&self) -> Result<JointLimits, InputError> {

@@ -105,7 +105,7 @@ mod tests {
         Rig {
             chucks: vec![point("A", 0.5), point("B", 0.7)],
             spheres: vec![point("1", 0.1)],
-            bar: Some(Bar { lengths_m: vec![0.46, 0.61], travel_m: 0.08 }),
+            bar: Some(Bar::new(vec![0.46, 0.61], 0.08)),
             solids: Solids::default(),
         }
     }

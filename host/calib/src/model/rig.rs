@@ -55,9 +55,42 @@ pub struct Bar {
     pub lengths_m: Vec<f64>,
     /// Travel of the LVDT from end to end, metres.
     pub travel_m: f64,
+    /// How well the lengths at mid travel are known, one standard deviation each, metres, zero where it is exact. `None` where nobody says.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub zero_tolerances_m: Option<Vec<f64>>,
+    /// How well the LVDT's gain is known: the standard deviation of displacements from mid travel, as a part of them, zero where it is
+    /// exact. `None` where nobody says.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub gain_tolerance: Option<f64>,
 }
 
 impl Bar {
+    /// Lengths of one bar are the same when they are nearer than this: they are whole millimetres.
+    pub(crate) const SAME_M: f64 = 1e-6;
+
+    /// A bar of which nobody says how well it is known.
+    pub fn new(lengths_m: Vec<f64>, travel_m: f64) -> Self {
+        Self { lengths_m, travel_m, zero_tolerances_m: None, gain_tolerance: None }
+    }
+
+    /// How well the length with one rod is known, metres; where the bar has no such rod, or `None` is asked of, as that which is known worst.
+    pub fn zero_tolerance_m(&self, length_m: Option<f64>) -> Option<f64> {
+        let tolerances_m = self.zero_tolerances_m.as_deref()?;
+        let is_asked = |known_m: &f64| length_m.is_some_and(|length_m| (known_m - length_m).abs() < Self::SAME_M);
+        let rod = self.lengths_m.iter().position(is_asked);
+        rod.and_then(|rod| tolerances_m.get(rod).copied()).or_else(|| tolerances_m.iter().copied().reduce(f64::max))
+    }
+
+    /// Whether its numbers are those that a bar can have.
+    fn is_sound(&self) -> bool {
+        let is_size = |size_m: &f64| size_m.is_finite() && *size_m > 0.0;
+        let zeros_m = self.zero_tolerances_m.as_deref();
+        !self.lengths_m.is_empty()
+            && self.lengths_m.iter().chain([&self.travel_m]).all(is_size)
+            && zeros_m.is_none_or(|zeros_m| zeros_m.len() == self.lengths_m.len())
+            && zeros_m.unwrap_or_default().iter().chain(&self.gain_tolerance).all(is_tolerance)
+    }
+
     /// Whether the bar, with one or another extension, can have this length.
     pub fn reaches(&self, length_m: f64) -> bool {
         self.lengths_m.iter().any(|middle_m| (length_m - middle_m).abs() <= self.travel_m / 2.0)
@@ -120,8 +153,18 @@ pub enum RigError {
         /// The name of the chuck or sphere.
         name: String,
     },
-    /// The bar has no length, or its travel or a length is not above zero.
-    #[error("the bar's travel and lengths have to be finite and above zero, and a length there has to be")]
+    /// A centre's tolerance is infinite, below zero or not a number.
+    #[error("{end} `{name}` has a tolerance that is no finite number from 0 on")]
+    Tolerance {
+        /// Which end of the bar.
+        end: End,
+        /// The name of the chuck or sphere.
+        name: String,
+    },
+    /// The bar has no length, or its travel or a length is not above zero, or a tolerance is below, or there is not one for each length.
+    #[error(
+        "the bar's travel and lengths have to be finite and above zero, and a length there has to be; its tolerances from 0 on, one a length"
+    )]
     Bar,
 }
 
@@ -139,9 +182,7 @@ impl Rig {
     pub(super) fn checked(self) -> Result<Self, RigError> {
         check_points(End::Chuck, &self.chucks)?;
         check_points(End::Sphere, &self.spheres)?;
-        let is_size = |size_m: &f64| size_m.is_finite() && *size_m > 0.0;
-        let is_bar = |bar: &Bar| !bar.lengths_m.is_empty() && bar.lengths_m.iter().chain([&bar.travel_m]).all(is_size);
-        if self.bar.as_ref().is_none_or(is_bar) { Ok(self) } else { Err(RigError::Bar) }
+        if self.bar.as_ref().is_none_or(Bar::is_sound) { Ok(self) } else { Err(RigError::Bar) }
     }
 
     /// Centres of the two ends of a pairing.
@@ -182,16 +223,23 @@ impl Rig {
     }
 }
 
+fn is_tolerance(tolerance: &f64) -> bool {
+    tolerance.is_finite() && *tolerance >= 0.0
+}
+
 fn check_points(end: End, points: &[NamedPoint]) -> Result<(), RigError> {
     if points.is_empty() {
         return Err(RigError::Empty(end));
     }
-    for (i, NamedPoint { name, position_m, .. }) in points.iter().enumerate() {
+    for (i, NamedPoint { name, position_m, tolerance_m }) in points.iter().enumerate() {
         if points[..i].iter().any(|other| other.name == *name) {
             return Err(RigError::Duplicate { end, name: name.clone() });
         }
         if !position_m.iter().all(|x| x.is_finite()) {
             return Err(RigError::NotFinite { end, name: name.clone() });
+        }
+        if !tolerance_m.iter().all(is_tolerance) {
+            return Err(RigError::Tolerance { end, name: name.clone() });
         }
     }
     Ok(())
@@ -216,16 +264,40 @@ mod tests {
         assert_eq!(Rig::new(points(&[("A", 0.0), ("A", 0.1)]), good(), None), Err(twice));
         let nowhere = RigError::NotFinite { end: End::Sphere, name: "B".to_owned() };
         assert_eq!(Rig::new(good(), points(&[("A", 0.0), ("B", f64::NAN)]), None), Err(nowhere));
+        for tolerance_m in [-1e-3, f64::NAN, f64::INFINITY] {
+            let mut ends = good();
+            ends[1].tolerance_m = Some(tolerance_m);
+            let refused = RigError::Tolerance { end: End::Chuck, name: "B".to_owned() };
+            assert_eq!(Rig::new(ends, good(), None), Err(refused));
+        }
     }
 
     #[test]
     fn a_bar_has_a_length_and_travel() {
-        let rig = |lengths_m: &[f64], travel_m| {
-            Rig::new(points(&[("A", 0.0)]), points(&[("1", 0.0)]), Some(Bar { lengths_m: lengths_m.to_vec(), travel_m }))
-        };
+        let with = |bar| Rig::new(points(&[("A", 0.0)]), points(&[("1", 0.0)]), Some(bar));
+        let rig = |lengths_m: &[f64], travel_m| with(Bar::new(lengths_m.to_vec(), travel_m));
         assert!(rig(&[0.46, 0.61], 0.075).is_ok());
         for (lengths_m, travel_m) in [(&[][..], 0.075), (&[0.46, 0.0], 0.075), (&[0.46], f64::NAN), (&[f64::INFINITY], 0.075)] {
             assert_eq!(rig(lengths_m, travel_m), Err(RigError::Bar));
         }
+        let known = |zero_tolerances_m: &[f64], gain_tolerance| {
+            let plain = Bar::new(vec![0.46, 0.61], 0.075);
+            Bar { zero_tolerances_m: Some(zero_tolerances_m.to_vec()), gain_tolerance: Some(gain_tolerance), ..plain }
+        };
+        assert!(with(known(&[0.0, 2e-4], 0.0)).is_ok());
+        for (zero_tolerances_m, gain_tolerance) in
+            [(&[2e-4][..], 1e-3), (&[2e-4, -2e-4], 1e-3), (&[2e-4, f64::INFINITY], 1e-3), (&[0.0, 0.0], f64::NAN)]
+        {
+            assert_eq!(with(known(zero_tolerances_m, gain_tolerance)), Err(RigError::Bar));
+        }
+    }
+
+    #[test]
+    fn a_rod_has_the_tolerance_of_its_length() {
+        let plain = Bar::new(vec![0.61, 0.46], 0.075);
+        assert_eq!(plain.zero_tolerance_m(Some(0.46)), None);
+        let bar = Bar { zero_tolerances_m: Some(vec![5e-4, 2e-4]), ..plain };
+        let tolerances_m = [Some(0.46), Some(0.61), Some(0.5), None].map(|length_m| bar.zero_tolerance_m(length_m));
+        assert_eq!(tolerances_m, [2e-4, 5e-4, 5e-4, 5e-4].map(Some));
     }
 }

@@ -70,8 +70,8 @@ impl Kind {
     /// [`UnknownError`] when it has none.
     pub fn block(self, robot: &Robot, rig: &Rig, dataset: &Dataset) -> Result<AnyBlock, UnknownError> {
         Ok(match self {
-            Self::BarZero => AnyBlock::BarZero(BarZero),
-            Self::RodZeros => AnyBlock::RodZeros(RodZeros::new(rig, dataset)),
+            Self::BarZero => AnyBlock::BarZero(BarZero::new(rig, dataset)?),
+            Self::RodZeros => AnyBlock::RodZeros(RodZeros::new(rig, dataset)?),
             Self::BarGain => AnyBlock::Gain(Gain::new(rig, dataset)?),
             Self::Latency => AnyBlock::Latency(Latency::new(dataset)?),
             Self::Rig => AnyBlock::Rig(RigBlock::new(rig, dataset)?),
@@ -127,6 +127,9 @@ pub enum UnknownError {
     /// The rig has no bar, and rows say nothing of theirs.
     #[error("nothing says how long the bar is at mid travel")]
     NoRods,
+    /// The rig says of the bar's zeros, or of its gain, that they are known exactly.
+    #[error("the rig says of {} that it is known exactly", .0.name())]
+    KnownExactly(Kind),
     /// No length changed while it was measured.
     #[error("no length was measured in motion")]
     NoMotion,
