@@ -15,7 +15,7 @@ use super::builtin::ROBOTS;
 use super::edit::{set_number, set_numbers};
 use super::numbers::{Range as Of, deserialize, in_range, vector};
 use super::problem::{Problem, short};
-use super::robot_terms::{BodyToml, JointTermsToml, TermsReader, eccentricity, set_terms};
+use super::robot_terms::{BodyToml, JointTermsToml, TermsReader, eccentricity, set_center, set_terms};
 use super::robot_tolerances::{TolerancesToml, set_joint, set_link};
 use super::source::{InputError, Source};
 use crate::text::one_line;
@@ -197,7 +197,7 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
     })
 }
 
-/// A robot's text, comments and all, with other parameters, other joint terms where they have changed, and a `[calibration]` table.
+/// A robot's text, comments and all, with other parameters, other joint terms and centres of mass where they have changed, and a `[calibration]` table.
 ///
 /// # Errors
 /// The reason why the text could not be edited.
@@ -215,6 +215,9 @@ pub fn calibrated_toml(
         let rotation = [link.alpha_rad, link.beta_rad, link.gamma_rad].map(f64::to_degrees);
         set_numbers(&mut document["links"][i]["translation_mm"], translation.iter().copied());
         set_numbers(&mut document["links"][i]["rotation_deg"], rotation.into_iter());
+        if let Some(joint) = i.checked_sub(1) {
+            set_center(&mut document["links"][i], &written.masses.links[joint], &terms.masses.links[joint]);
+        }
         if let Some(joint) = chain.joint(i) {
             let unit = ScreenUnit::from(joint.kind);
             set_number(&mut document["joints"][i][&format!("offset_{}", unit.name())], unit.from_si(joint.offset));
