@@ -3,6 +3,7 @@
 mod assessments;
 mod built_in_robots;
 mod canonical_frames;
+mod causes;
 mod designs;
 mod fits_in_other_frames;
 mod golden;

@@ -9,6 +9,7 @@
 //! `docs/identification.md` says what each answer takes and why.
 
 mod assessment;
+mod causes;
 mod evidence;
 mod mistake;
 mod order;
@@ -19,6 +20,7 @@ mod reservations;
 mod suspicion;
 
 pub use assessment::{Answer, Assessment};
+pub use causes::{AngleUnit, Cause, CauseKind, FittedRows, LeftOut, LengthUnit, RowsOf, causes};
 pub use evidence::Evidence;
 pub use mistake::Mistake;
 pub use order::Order;
