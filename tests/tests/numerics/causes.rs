@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use ballbar_calib::assess::{Cause, CauseKind, FittedRows, LeftOut, RowsOf, causes};
-use ballbar_calib::identify::{LmOptions, residuals, solve_lengths};
+use ballbar_calib::assess::{Cause, CauseKind, FittedRows, RowsOf, causes};
+use ballbar_calib::identify::{LmOptions, WrongRow, residuals, solve_lengths};
 use ballbar_calib::model::{Dataset, End, PairingId, Rig, Robot};
 use ballbar_calib::{Encoder, FreeParameters, Parameter, Vector3};
 use ballbar_tests::at_length::at_length;
@@ -38,7 +38,7 @@ impl Told {
         const FAR: f64 = 4.5; // standard deviations
         let residuals = residuals(&robot.kinematics(), dataset);
         let far = residuals.iter().map(|residual| residual.value_m / sigma_m).enumerate().filter(|(_, z)| z.abs() > FAR);
-        let left_out: Vec<LeftOut> = far.map(|(row, deviations)| LeftOut { row, deviations }).collect();
+        let left_out: Vec<WrongRow> = far.map(|(row, deviations)| WrongRow { row, residual_m: 0.0, deviations }).collect();
         let fitted = FittedRows { robot, rig, dataset, residuals: &residuals, sigma_m };
         let causes = causes(&fitted, &left_out);
         let mut told: Vec<usize> = causes.iter().flat_map(|cause| cause.rows.iter().copied()).collect();

@@ -257,7 +257,8 @@ fn left_out_text(document: &FitDocument) -> String {
     for line in &document.left_out {
         table.row([line.row.to_string(), line.place.clone(), fixed(line.residual_mm, 4), format!("{:+.0}", line.deviations)]);
     }
-    format!("\nleft out: these rows contradict the others\n{}", table.text())
+    let causes: String = document.causes.iter().map(|cause| format!("  {cause}\n")).collect();
+    format!("\nleft out: these rows contradict the others\n{causes}{}", table.text())
 }
 
 fn outliers_text(document: &FitDocument) -> String {

@@ -66,6 +66,8 @@ pub struct FitDocument {
     pub outlier_details: Vec<OutlierLine>,
     /// Rows that were left out of the fit, because they contradict the others.
     pub left_out: Vec<LeftOutLine>,
+    /// Why they were, as far as that can be seen; a clause each, what explains the most rows first.
+    pub causes: Vec<String>,
     /// What the tolerances of the robot's file had to say; none where they were not asked.
     pub prior: Option<PriorLine>,
     /// The largest residuals.
@@ -228,6 +230,7 @@ impl FitDocument {
             outliers: outlier_details.iter().map(|outlier| outlier.row).collect(),
             outlier_details,
             left_out: left_out_lines(dataset, fit),
+            causes: assessment.causes.iter().map(|cause| cause.to_string()).collect(),
             prior: fit.prior.as_ref().map(|prior| PriorLine {
                 factor: prior.factor,
                 told: fit.uncertainty.told,

@@ -1,12 +1,14 @@
 //! The answer, and its grounds in whole sentences.
 
+use super::causes::{Cause, CauseKind, FittedRows, causes};
 use super::evidence::Evidence;
 use super::order::{Order, by_pairing, offset, trend};
 use super::proof::{Proof, decisive, proofs};
 use super::refusals::{Judged, Refusal, RmsLimit, judge};
-use super::reservations::{Grounds, reservations};
+use super::reservations::{Grounds, reservations, sentence};
 use super::suspicion::{Suspicion, suspect};
 use crate::identify::{AndersonDarling, Offset, Residual, Trend, anderson_darling, residuals};
+use crate::model::Robot;
 
 /// What the result is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +59,8 @@ pub struct Assessment {
     pub refusals: Vec<Refusal>,
     /// The mistake that would explain lengths that do not fit.
     pub suspicion: Option<Suspicion>,
+    /// Why rows were left out, what explains the most of them first; none where none was.
+    pub causes: Vec<Cause>,
     /// How large an RMS residual was believed.
     pub rms_limit: RmsLimit,
     /// What the fit has not seen: files and poses held out, its own poses left out in turn, then other lengths of fitted postures.
@@ -112,6 +116,7 @@ impl Assessment {
             reasons: Vec::new(),
             refusals: Vec::new(),
             suspicion: None,
+            causes: causes_of(evidence),
             rms_limit,
             proofs: proofs(evidence, fit.counted(residuals(&robot.kinematics(), dataset))),
             trend: trend(evidence, &placed),
@@ -124,7 +129,8 @@ impl Assessment {
             Judged::Refused(refusals) => {
                 assessment.suspicion = suspect(evidence, &refusals);
                 assessment.reasons.extend(refusals.iter().map(Refusal::to_string));
-                assessment.reasons.extend(assessment.suspicion.as_ref().map(Suspicion::to_string));
+                let first = assessment.suspicion.as_ref().map(Suspicion::to_string);
+                assessment.reasons.extend(first.or_else(|| assessment.likeliest_cause()));
                 assessment.refusals = refusals;
             }
             Judged::NothingToCorrect => {
@@ -139,14 +145,34 @@ impl Assessment {
         assessment
     }
 
+    /// What made the most rows wrong, in a whole sentence.
+    fn likeliest_cause(&self) -> Option<String> {
+        let cause = self.causes.iter().find(|cause| cause.kind != CauseKind::Unknown)?;
+        Some(sentence(&format!("Look at this first: {cause}")))
+    }
+
     fn grounds(&self) -> Grounds<'_> {
-        let Self { proofs, trend, farthest_offset, normality, .. } = self;
+        let Self { causes, proofs, trend, farthest_offset, normality, .. } = self;
         let is_unchanged = self.answer == Answer::Unchanged;
-        Grounds { is_unchanged, proofs, trend: *trend, farthest_offset: *farthest_offset, normality: *normality }
+        Grounds { is_unchanged, causes, proofs, trend: *trend, farthest_offset: *farthest_offset, normality: *normality }
     }
 
     /// The proof that says the least good of the fit: the one to go by.
     pub fn decisive_proof(&self) -> Option<&Proof> {
         decisive(&self.proofs)
     }
+}
+
+/// The causes of rows that a fit has left out.
+fn causes_of(evidence: &Evidence<'_>) -> Vec<Cause> {
+    let Evidence { robot, rig, dataset, fit, .. } = *evidence;
+    let Some(sigma_m) = fit.uncertainty.sigma_m.filter(|&sigma_m| sigma_m > 0.0 && !fit.wrong_rows.is_empty()) else {
+        return Vec::new();
+    };
+    let found = Robot { chain: fit.solution.chain.clone(), terms: fit.terms(robot), ..robot.clone() };
+    let weights = dataset.rows.iter().map(|row| row.measurement.weight);
+    let residuals: Vec<Residual> =
+        fit.residuals.iter().zip(weights).map(|(residual, weight)| Residual { weight, ..*residual }).collect();
+    let rig = fit.rig(rig);
+    causes(&FittedRows { robot: &found, rig: &rig, dataset, residuals: &residuals, sigma_m }, &fit.wrong_rows)
 }

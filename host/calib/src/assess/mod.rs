@@ -20,7 +20,7 @@ mod reservations;
 mod suspicion;
 
 pub use assessment::{Answer, Assessment};
-pub use causes::{AngleUnit, Cause, CauseKind, FittedRows, LeftOut, LengthUnit, RowsOf, causes};
+pub use causes::{AngleUnit, Cause, CauseKind, FittedRows, LengthUnit, RowsOf, causes};
 pub use evidence::Evidence;
 pub use mistake::Mistake;
 pub use order::Order;

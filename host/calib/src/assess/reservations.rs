@@ -1,5 +1,6 @@
 //! What weighs on the numbers of a fit that is worth keeping, in whole sentences.
 
+use super::causes::Cause;
 use super::evidence::Evidence;
 use super::plausibility::{Change, far_beyond_limits, large_changes_of};
 use super::proof::{Proof, decisive};
@@ -24,6 +25,7 @@ const ROUNDING_M: f64 = 1e-6;
 pub(super) struct Grounds<'a> {
     /// The parameters stay as they are.
     pub(super) is_unchanged: bool,
+    pub(super) causes: &'a [Cause],
     pub(super) proofs: &'a [Proof],
     pub(super) trend: Option<Trend>,
     pub(super) farthest_offset: Option<Offset>,
@@ -71,7 +73,9 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
     }
     let (wrong, of) = (fit.wrong_rows.len(), dataset.rows.len());
     if wrong as f64 > MANY_WRONG * of as f64 {
-        reserves.push(format!("{wrong} of {of} lengths contradict the others and were left out."));
+        let causes: Vec<String> = grounds.causes.iter().map(Cause::to_string).collect();
+        reserves
+            .push(sentence(&format!("{wrong} of {of} lengths contradict the others and were left out: {}", causes.join("; "))));
     }
     match fit.outliers.as_slice() {
         [] => {}
@@ -147,6 +151,11 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
         ));
     }
     reserves
+}
+
+/// Ended, where it is no question.
+pub(super) fn sentence(text: &str) -> String {
+    if text.ends_with('?') { text.to_owned() } else { format!("{text}.") }
 }
 
 /// Lengths that deviate otherwise than the poses state.

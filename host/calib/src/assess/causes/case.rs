@@ -2,8 +2,8 @@
 
 use ballbar::{JointVector, Kinematics, Matrix3, Vector3};
 
-use super::{FittedRows, LeftOut};
-use crate::identify::Residual;
+use super::FittedRows;
+use crate::identify::{Residual, WrongRow};
 use crate::model::{Dataset, PairingId, PoseRow, Rig, Robot};
 
 /// One row as the fit leaves it.
@@ -30,7 +30,7 @@ pub(super) struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    pub(super) fn new(fitted: &FittedRows<'a>, left_out: &[LeftOut]) -> Self {
+    pub(super) fn new(fitted: &FittedRows<'a>, left_out: &[WrongRow]) -> Self {
         let &FittedRows { robot, rig, dataset, residuals, sigma_m } = fitted;
         /// Below it, a nanometre, residuals are the rounding of a file's digits.
         const LEAST_M: f64 = 1e-9;

@@ -160,7 +160,7 @@ fn refined(case: &Case<'_>, open: &[usize], joint: usize, mut by: f64) -> Option
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FittedRows, LeftOut};
+    use super::super::{FittedRows, WrongRow};
     use super::*;
     use crate::designs;
     use crate::identify::residuals;
@@ -184,7 +184,7 @@ mod tests {
             let dataset = Dataset::new("computed", vec![PoseRow::new(&rig, pairing, off, length_m).unwrap()]).unwrap();
             let residuals = residuals(&kinematics, &dataset);
             let fitted = FittedRows { robot: &robot, rig: &rig, dataset: &dataset, residuals: &residuals, sigma_m: 5e-5 };
-            let case = Case::new(&fitted, &[LeftOut { row: 0, deviations: 1e3 }]);
+            let case = Case::new(&fitted, &[WrongRow { row: 0, residual_m: 0.0, deviations: 1e3 }]);
             let solutions = solutions(&case, 0, joint);
             assert!(solutions.len() <= 2);
             found += usize::from(solutions.iter().any(|solution| (solution.by - BY).abs() < 1e-9));

@@ -1,7 +1,7 @@
 //! Why a row was left out: each likely cause is tried on the rows that a fit to the others leaves far off.
 //!
 //! ```text
-//! FittedRows, LeftOut ─▶ Case (residuals, standard deviations, bars)
+//! FittedRows, WrongRow ─▶ Case (residuals, standard deviations, bars)
 //!                         │
 //!    ends     two chucks or spheres exchanged; another pairing, row by row ─┐
 //!    lengths  unit, rod, none, repeated; of the next or previous row        │  CauseKind ─ remedy: the row's residual without it
@@ -29,7 +29,7 @@ use std::fmt;
 
 pub use kind::{AngleUnit, CauseKind, LengthUnit, RowsOf};
 
-use crate::identify::Residual;
+use crate::identify::{Residual, WrongRow};
 use crate::model::{Dataset, Rig, Robot};
 use case::Case;
 use weigh::Candidate;
@@ -47,16 +47,6 @@ pub struct FittedRows<'a> {
     pub residuals: &'a [Residual],
     /// Standard deviation of a length of weight one, metres, above zero.
     pub sigma_m: f64,
-}
-
-/// A row that was left out of a fit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct LeftOut {
-    /// Row index, from 0.
-    pub row: usize,
-    /// How far off it is, in standard deviations of its residual: the fit's own uncertainty there counts.
-    pub deviations: f64,
 }
 
 /// What probably made some rows wrong. Its text is a clause: `rows 12 and 40 fit with chuck B instead of A`.
@@ -85,7 +75,7 @@ impl fmt::Display for Cause {
 ///
 /// # Panics
 /// When the parts do not belong together: not a residual for each row, a row that is none of the dataset's, or a pairing that the rig lacks.
-pub fn causes(fitted: &FittedRows<'_>, left_out: &[LeftOut]) -> Vec<Cause> {
+pub fn causes(fitted: &FittedRows<'_>, left_out: &[WrongRow]) -> Vec<Cause> {
     /// A cause is named where it is likelier than none by this factor: e.
     const LEAST_LOG_ODDS: f64 = 1.0;
     let case = Case::new(fitted, left_out);
