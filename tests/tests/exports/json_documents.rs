@@ -80,7 +80,7 @@ fn fit_documents_what_it_found() {
 #[test]
 fn fit_documents_numbers_that_do_not_exist_as_null() {
     let folder = puma();
-    let fit = document(&folder, 0, &[&["fit"], &DESIGN, &["poses.csv", "--hold", "none"]]);
+    let fit = document(&folder, 0, &[&["fit"], &DESIGN, &["poses.csv", "--hold", "none", "--prior", "none"]]);
     assert!(fit["condition"].is_null(), "infinite is no number of JSON");
     assert_eq!(count(&fit["free_parameters"]), 54);
     assert!(list(&fit["parameters"]).iter().any(|parameter| parameter["held"] == false && parameter["std"].is_null()));
@@ -102,8 +102,14 @@ fn fit_documents_outliers_by_row_number_and_why_nothing_was_written() {
         .collect();
     fs::write(&path, rows.join("\n")).expect("a file in the temporary folder");
     let fit = document(&folder, 0, &[&["fit"], &DESIGN, &["poses.csv"]]);
+    let left_out: Vec<u64> = list(&fit["left_out"]).iter().map(|line| count(&line["row"])).collect();
+    assert_eq!(left_out, [25, 100], "rows are numbered from 1, without the header");
+    assert_eq!(list(&fit["outliers"]).len(), 0);
+    near(&fit["left_out"][0]["residual_mm"], 2.0, 0.5);
+    assert!(number(&fit["left_out"][0]["deviations"]) > 10.0);
+    let fit = document(&folder, 0, &[&["fit"], &DESIGN, &["poses.csv", "--loss", "none"]]);
     let outliers: Vec<u64> = list(&fit["outliers"]).iter().map(count).collect();
-    assert!(outliers.contains(&25) && outliers.contains(&100), "rows are numbered from 1, without the header: {outliers:?}");
+    assert!(outliers.contains(&25) && outliers.contains(&100), "{outliers:?}");
 
     // The design's own lengths with much noise: whatever a fit changes is wrong.
     let noise = ["--bar", "460", "--per-pair", "6", "--sigma-mm", "5", "--seed", "1", "--out", "noise.csv"];

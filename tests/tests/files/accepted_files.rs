@@ -127,10 +127,11 @@ fn worst_difference(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn equal_weights_are_none_and_garbage_that_is_said_to_be_garbage_does_no_harm() {
     let folder = puma();
-    let good = fitted(&fit(&folder, &["poses.csv"]));
+    const PLAIN: [&str; 4] = ["--prior", "none", "--loss", "none"];
+    let good = fitted(&fit(&folder, &[&["poses.csv"][..], &PLAIN].concat()));
     let document = |sigma: &str, garbage_sigma: &str| {
         put(&folder, "weighed.csv", &weighed(&folder, sigma, garbage_sigma, 26));
-        let run = host_cal_in(folder.path(), &[&["fit"], &DESIGN[..], &["weighed.csv", "--json"]].concat());
+        let run = host_cal_in(folder.path(), &[&["fit"], &DESIGN[..], &PLAIN, &["weighed.csv", "--json"]].concat());
         fitted(&run.json())
     };
     let trusted = document("0.1", "0.1");
