@@ -227,7 +227,8 @@ impl<S: Real> JointTerms<S> {
 
     fn check_masses(&self, joints: usize) -> Result<(), TermsError> {
         const MAX_MASS_KG: f64 = 1e5;
-        const MAX_CENTER_M: f64 = 100.0;
+        // As far as a frame may be written from its link.
+        const MAX_CENTER_M: f64 = 1e3;
         const MAX_GRAVITY_M_S2: f64 = 100.0;
         for (joint, body) in self.masses.links.iter().chain([&self.masses.payload]).enumerate() {
             let is_possible = body.mass_kg >= S::zero()

@@ -82,9 +82,14 @@ fn a_calibrated_robot_keeps_its_terms_and_takes_others() {
     fitted.set_coefficient(0, TermKind::Cos2Q, 1e-4);
     fitted.set_coefficient(2, TermKind::Compliance, 1e-6);
     fitted.set_coefficient(2, TermKind::Backlash, -3e-5);
+    // One centre moves, the other by less than anybody knows of it.
+    fitted.masses.links[1].center_m.x += 5e-5;
+    fitted.masses.links[2].center_m.x += 0.02;
     let written = calibrated_toml(&source, &before.chain, &fitted, &calibration).unwrap();
     assert!(written.contains(" # of the gear"), "{written}");
+    assert!(written.contains("center_mm = [68.0, 6.0, -16.0] # by CAD"), "{written}");
     let read = robot(&written).terms;
+    assert!((read.masses.links[2].center_m - fitted.masses.links[2].center_m).norm() < 1e-12, "{written}");
     for joint in 0..6 {
         for term in TermKind::ALL {
             let (found, expected) = (read.coefficient(joint, term), fitted.coefficient(joint, term));

@@ -1,10 +1,12 @@
 //! The same robot in other frames is fitted alike.
 
-use ballbar::{Chain, Kinematics};
+use ballbar::{Body, Chain, Kinematics, TermKind, Vector3};
 use ballbar_calib::assess::{Assessment, Evidence};
 use ballbar_calib::identify::{Fit, FitOptions, fit};
+use ballbar_calib::kinematics::CanonicalFrames;
 use ballbar_calib::model::{Dataset, JointLimits, NamedPoint, PairingId, PoseRow, Rig, Robot};
 use ballbar_calib::simulate::Shells;
+use ballbar_calib::unknowns::Kind;
 use ballbar_tests::at_length::at_length;
 use ballbar_tests::data::real_data;
 use ballbar_tests::experiment::dataset;
@@ -113,6 +115,71 @@ fn any_chain_in_far_and_turned_frames_is_fitted_as_it_is_in_its_own() {
         assert!(off_m < SAME_M, "{run}: {off_m} m, {:?}", robot.chain);
         assert_eq!((answer, reasons), (far_answer, far_reasons), "{run}");
     }
+}
+
+/// Masses stay with their links where a fit moves a far frame by centimetres, so that gravity bends the robot as it does in near frames.
+#[test]
+fn what_gravity_does_to_the_joints_is_the_same_in_all_frames() {
+    const RAD_PER_NM: f64 = 1e-5;
+    let rig = open_rig("triangles").unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(15);
+    let mut design = open_robot("puma560").unwrap();
+    for (link, mass_kg) in design.terms.masses.links.iter_mut().zip([12.0, 17.0, 6.0, 1.0, 0.5, 0.2]) {
+        *link = Body { mass_kg, center_m: Vector3::new(0.1, 0.0, 0.05) };
+    }
+    let mut truth = Robot { chain: plausible_robot(&design.chain, &mut rng), ..design.clone() };
+    (0..6).for_each(|joint| truth.terms.set_coefficient(joint, TermKind::Compliance, RAD_PER_NM));
+    let shells = Shells {
+        planned_with: &design,
+        truth: &truth,
+        rig: &rig,
+        pairings: &rig.all_pairings(),
+        bar_m: 0.46,
+        per_pairing: 20,
+        sigma_m: 20e-6,
+        seed: 3,
+    };
+    let poses = dataset(shells.simulate(|| ()).unwrap().into_iter().map(|pose| pose.row).collect());
+    let chain = rewritten(&design.chain, 100.0, &mut rng);
+    let mut far = Robot { chain, ..design.clone() };
+    // The masses of the same robot, seen from its far frames: back by the way of the canonical ones.
+    let canonical = CanonicalFrames::new(&design.chain).terms(&design.terms);
+    let frames = CanonicalFrames::new(&far.chain);
+    for joint in 0..6 {
+        let at = |center_m: Vector3<f64>| {
+            let mut terms = design.terms;
+            terms.masses.links[joint].center_m = center_m;
+            frames.terms(&terms).masses.links[joint].center_m
+        };
+        // A rigid motion: its columns and its origin, turned about.
+        let origin_m = at(Vector3::zeros());
+        let turn = nalgebra::Matrix3::from_columns(&[Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| at(axis) - origin_m));
+        far.terms.masses.links[joint].center_m = turn.transpose() * (canonical.masses.links[joint].center_m - origin_m);
+    }
+    let found = [&design, &far].map(|robot| {
+        let unknowns = vec![Kind::Compliance.block(robot, &rig, &poses).unwrap()];
+        fit(robot, &poses, &FitOptions { unknowns, ..FitOptions::default() }).unwrap()
+    });
+    let robots = [found[0].robot(&design), found[1].robot(&far)];
+    let kept = Robot { terms: found[1].terms(&far), ..robots[1].clone() };
+    let most_apart = |other: &Robot| {
+        let load = |robot: &Robot, q: &_| Kinematics::new(&robot.chain).gravity_loads(&robot.terms.masses, q);
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let apart = |rng: &mut ChaCha8Rng| {
+            let q: Vec<f64> = design.limits.iter().map(|limits| rng.random_range(limits.min..limits.max)).collect();
+            let q = design.chain.joint_vector(&q).unwrap();
+            let (near_nm, other_nm) = (load(&robots[0], &q), load(other, &q));
+            let loads = near_nm.as_array().iter().zip(other_nm.as_array());
+            let loads_nm = loads.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let tool = |robot: &Robot| robot.kinematics().base_from_tool(&q).translation_m;
+            (loads_nm, (tool(&robots[0]) - tool(other)).norm())
+        };
+        (0..200).map(|_| apart(&mut rng)).fold((0.0_f64, 0.0_f64), |most, one| (most.0.max(one.0), most.1.max(one.1)))
+    };
+    let (moved, stayed) = (most_apart(&robots[1]), most_apart(&kept));
+    println!("{moved:?} (Nm, m) with masses that stay with their links, {stayed:?} with their frames");
+    assert!(moved.0 < 1e-6 && moved.1 < 1e-9, "{moved:?}");
+    assert!(stayed.0 > 0.5 && stayed.1 > 1e-5, "{stayed:?}");
 }
 
 #[test]

@@ -44,7 +44,7 @@ pub fn write_calibrated(
 ) -> Result<bool, CalibratedError> {
     let Some((chain, calibration)) = calibration(evidence, assessment) else { return Ok(false) };
     let is_unchanged = assessment.answer == Answer::Unchanged;
-    let terms = if is_unchanged { evidence.robot.terms } else { evidence.fit.terms(evidence.robot) };
+    let terms = if is_unchanged { evidence.robot.terms } else { evidence.fit.robot(evidence.robot).terms };
     let edited = calibrated_toml(design, chain, &terms, &calibration);
     let text = edited.map_err(|error| CalibratedError::Edit { name: design.name().to_owned(), reason: error.to_string() })?;
     Output { path, kind: FileKind::Robot, force }.write(&text)?;

@@ -14,7 +14,7 @@ use toml_edit::{DocumentMut, Item, Table, value};
 use super::builtin::ROBOTS;
 use super::numbers::{Range as Of, deserialize, in_range, vector};
 use super::problem::{Problem, short};
-use super::robot_terms::{BodyToml, JointTermsToml, TermsReader, eccentricity, set_terms};
+use super::robot_terms::{BodyToml, JointTermsToml, TermsReader, eccentricity, set_center, set_terms};
 use super::source::{InputError, Source};
 use crate::text::one_line;
 use crate::units::{ScreenUnit, m_from_mm, tidy};
@@ -167,7 +167,7 @@ pub fn parse_robot(source: &Source) -> Result<Robot, InputError> {
     Ok(Robot { name, source: source.name().to_owned(), chain, terms, limits, encoders, calibration: file.calibration })
 }
 
-/// A robot's text, comments and all, with other parameters, other joint terms where they have changed, and a `[calibration]` table.
+/// A robot's text, comments and all, with other parameters, other joint terms and centres of mass where they have changed, and a `[calibration]` table.
 ///
 /// # Errors
 /// The reason why the text could not be edited.
@@ -185,6 +185,9 @@ pub fn calibrated_toml(
         let rotation = [link.alpha_rad, link.beta_rad, link.gamma_rad].map(f64::to_degrees);
         set_numbers(&mut document["links"][i]["translation_mm"], translation.iter().copied());
         set_numbers(&mut document["links"][i]["rotation_deg"], rotation.into_iter());
+        if let Some(joint) = i.checked_sub(1) {
+            set_center(&mut document["links"][i], &written.masses.links[joint], &terms.masses.links[joint]);
+        }
         if let Some(joint) = chain.joint(i) {
             let unit = ScreenUnit::from(joint.kind);
             set_number(&mut document["joints"][i][&format!("offset_{}", unit.name())], unit.from_si(joint.offset));

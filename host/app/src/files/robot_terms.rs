@@ -9,7 +9,7 @@ use toml_edit::{Array, Item};
 
 use super::numbers::{Range as Of, in_range, vector};
 use super::problem::Problem;
-use super::robot::set_number;
+use super::robot::{set_number, set_numbers};
 use super::source::{InputError, Source};
 use crate::units::{ScreenUnit, m_from_mm};
 
@@ -134,6 +134,15 @@ fn body(source: &Source, mass_kg: &Spanned<f64>, center_mm: &Spanned<Vec<Spanned
         mass_kg: in_range(source, "mass_kg", mass_kg, Of::Mass)?,
         center_m: Vector3::from(vector(source, "center_mm", center_mm)?.map(m_from_mm)),
     })
+}
+
+/// Writes a link's centre of mass where it has moved by more than anybody knows of one: what is nearer keeps its digits.
+pub(super) fn set_center(link: &mut Item, before: &Body<f64>, now: &Body<f64>) {
+    const NEAR_M: f64 = 1e-4;
+    if before.mass_kg > 0.0 && (before.center_m - now.center_m).norm() > NEAR_M {
+        let mm = now.center_m.map(|m| ScreenUnit::Millimetre.from_si(m));
+        set_numbers(&mut link["center_mm"], mm.iter().copied());
+    }
 }
 
 /// Writes the terms of a joint where they are not those that its text holds already.

@@ -102,7 +102,7 @@ impl<'a> Predictor<'a> {
         let free = fit.parameters.iter().enumerate().filter(|(_, parameter)| parameter.held.is_none());
         Self {
             design: robot.kinematics(),
-            fitted: Kinematics::with_terms(&fit.solution.chain, &fit.terms(robot)),
+            fitted: fit.robot(robot).kinematics(),
             free: free.map(|(index, _)| index).collect(),
             covariance: &fit.uncertainty.covariance,
         }

@@ -8,6 +8,7 @@ use super::hold::Held;
 use super::identifiability::{Finding, Identifiability};
 use super::uncertainty::Uncertainty;
 use crate::kinematics::CanonicalFrames;
+use crate::model::Robot;
 use crate::unknowns::Unknowns;
 
 /// A parameter that a metre or radian of no canonical one moves by as much stays where it is: above the rounding of frames a hundred metres
@@ -48,6 +49,15 @@ pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unkno
         };
     }
     Fit { parameters, solution, uncertainty, unknowns, identifiability, ..fit }
+}
+
+impl Fit {
+    /// The robot as it was found to be: its chain, and the terms of its joints with the masses where their links are.
+    pub fn robot(&self, robot: &Robot) -> Robot {
+        let chain = self.solution.chain.clone();
+        let terms = CanonicalFrames::new(&robot.chain).terms_in_user_frames(&chain, &self.terms(robot));
+        Robot { chain, terms, ..robot.clone() }
+    }
 }
 
 /// Why a parameter stays that nothing moves: in these frames' own names, or, where they do not tell, as in canonical ones, or because it turns

@@ -16,7 +16,7 @@ mod returning;
 
 use std::f64::consts::{PI, TAU};
 
-use ballbar::{Chain, Joint, JointKind, JointTerms, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Pose, Vector3};
+use ballbar::{Body, Chain, Joint, JointKind, JointTerms, Matrix3, PARAMETERS_PER_JOINT, ParameterKind, Pose, Vector3};
 use nalgebra::DMatrix;
 
 use self::returning::UserFrames;
@@ -76,10 +76,23 @@ impl CanonicalFrames {
         let mut canonical = *terms;
         let (user, own) = (AtZero::of(self.user.chain()), AtZero::of(&self.canonical));
         for ((body, user), own) in canonical.masses.links.iter_mut().zip(user.behind_joints()).zip(own.behind_joints()) {
-            let own_from_user = compose(&inverse(own), user);
-            body.center_m = own_from_user.rotation * body.center_m + own_from_user.translation_m;
+            body.center_m = seen_from(own, user, &body.center_m);
         }
         canonical
+    }
+
+    /// The user's joint terms for a chain that [`CanonicalFrames::in_user_frames`] has given: a frame a hundred metres away moves by centimetres where
+    /// its link is found to be turned by next to nothing, and the masses stay with their links.
+    pub fn terms_in_user_frames(&self, chain: &Chain<f64>, terms: &JointTerms<f64>) -> JointTerms<f64> {
+        if chain == self.user.chain() {
+            return *terms;
+        }
+        let mut moved = self.terms(terms);
+        let (user, own) = (AtZero::of(chain), AtZero::of(&self.in_canonical_frames(chain)));
+        for ((body, user), own) in moved.masses.links.iter_mut().zip(user.behind_joints()).zip(own.behind_joints()) {
+            *body = Body { center_m: seen_from(user, own, &body.center_m), ..*body };
+        }
+        moved
     }
 
     /// The same with lengths in whole nanometres and angles in whole 2⁻³³ of a turn (0.7 nrad): the same bits however the robot is written,
@@ -195,6 +208,12 @@ impl AtZero {
     fn direction(&self, joint: usize) -> Vector3<f64> {
         self.frames[joint].rotation.column(2).into()
     }
+}
+
+/// A point of frame `of`, metres, in frame `to`.
+fn seen_from(to: &Pose<f64>, of: &Pose<f64>, point_m: &Vector3<f64>) -> Vector3<f64> {
+    let to_from_of = compose(&inverse(to), of);
+    to_from_of.rotation * point_m + to_from_of.translation_m
 }
 
 /// What a joint does at encoder zero.
