@@ -1,6 +1,7 @@
 //! Sessions, plans and robots that move: recording and collecting.
 
 mod accounts;
+mod approaches;
 mod collecting;
 mod collecting_a_calibration;
 mod collecting_by_controllers;

@@ -314,7 +314,7 @@ fn times_us(session: &Path) -> [Vec<u64>; 2] {
         }
     }
     let text = std::fs::read_to_string(session.join("poses.csv")).unwrap_or_default();
-    let t_us = |line: &str| (line.split(',').nth(9).unwrap().parse::<f64>().unwrap() * 1e6) as u64;
+    let t_us = |line: &str| (line.split(',').nth(10).unwrap().parse::<f64>().unwrap() * 1e6) as u64;
     let mut written: Vec<u64> = text.lines().skip(1).filter(|line| !line.starts_with('#')).map(t_us).collect();
     settled.sort_unstable();
     written.sort_unstable();

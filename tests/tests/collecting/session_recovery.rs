@@ -10,12 +10,14 @@ use std::path::{Path, PathBuf};
 use ballbar::wire::{
     Answer, BoardHello, Event, MAX_FRAME, PROTOCOL, ParameterSet, Reply, ResetReason, SampleBatch, Stream, ToHost, encode,
 };
-use ballbar::{JointKind, JointVector, LvdtReading, Sample, SettledPose, StillnessCriteria};
+use ballbar::{Approach, Direction, JointKind, JointVector, LvdtReading, Sample, SettledPose, StillnessCriteria};
 use ballbar_tests::at_length::times;
 use ballbar_tests::command::host_cal_in;
 use host_cal::board::{RobotOnBoard, nominal_lvdt, parameter_set};
 use host_cal::files::open_robot;
-use host_cal::session::{Connection, MeasuredPose, Recorder, Run, SessionLock, SettledFate, SettledRule, recover};
+use host_cal::session::{
+    Connection, MarkedPose, MeasuredPose, PoseMark, Recorder, Run, SessionLock, SettledFate, SettledRule, recover,
+};
 use tempfile::TempDir;
 
 const KINDS: [JointKind; 6] = [JointKind::Revolute; 6];
@@ -121,11 +123,17 @@ impl Recording {
     }
 
     fn sample(&mut self) -> &mut Self {
+        self.sample_at([5; 6])
+    }
+
+    fn sample_at(&mut self, counts: [i32; 6]) -> &mut Self {
         let lvdt = LvdtReading { code: 32_768, saturated: false };
         self.t_us += 1_000;
         let (index, t_us) = (index_at(self.t_us), self.t_us);
-        let sample = Sample { index, t_us, counts: [5; 6].into_iter().collect(), lvdt };
-        self.event(ALL_HOMED, Event::Samples(SampleBatch::new(sample)));
+        let sample = Sample { index, t_us, counts: counts.into_iter().collect(), lvdt };
+        let batch = SampleBatch::new(sample);
+        self.rule.take_samples(&self.robot, &batch);
+        self.event(ALL_HOMED, Event::Samples(batch));
         self.keep_state();
         self
     }
@@ -159,8 +167,9 @@ impl Recording {
 
     /// What `collect` keeps of a move, or of a stand.
     fn measure(&mut self, times_s: &[f64], plan_row: Option<usize>) -> &mut Self {
+        let approach = Approach::UNKNOWN.with(1, Some(Direction::Falling));
         let rate_m_s = (times_s.len() > 1).then_some(0.003);
-        let pose = |&t_s: &f64| MeasuredPose { q: JointVector::zero(), displacement_m: 0.001, t_s, rate_m_s, plan_row };
+        let pose = |&t_s: &f64| MeasuredPose { q: JointVector::zero(), approach, displacement_m: 0.001, t_s, rate_m_s, plan_row };
         let poses: Vec<MeasuredPose> = times_s.iter().map(pose).collect();
         let before = self.log_bytes();
         self.recorder().poses(&poses).unwrap();
@@ -249,7 +258,7 @@ impl Recording {
         found.sort_unstable();
         assert_eq!(found, expected, "cut after {cut} bytes");
         let widths: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-        assert!(widths.iter().all(|width| *width == 14) && text.is_empty() | text.ends_with('\n'), "{text}");
+        assert!(widths.iter().all(|width| *width == 15) && text.is_empty() | text.ends_with('\n'), "{text}");
     }
 }
 
@@ -263,7 +272,7 @@ fn us(t_s: f64) -> u64 {
 }
 
 fn times_us(poses: &str) -> Vec<u64> {
-    poses.lines().skip(1).map(|line| us(line.split(',').nth(9).unwrap().parse().unwrap())).collect()
+    poses.lines().skip(1).map(|line| us(line.split(',').nth(10).unwrap().parse().unwrap())).collect()
 }
 
 #[test]
@@ -345,6 +354,67 @@ fn the_log_tells_what_poses_csv_lacks_and_gives_it_back_but_what_was_taken_out()
     drop(lock);
     assert_eq!(host_cal_in(folder, &["log", "recover", "s"]).code, 2);
     assert_eq!(fs::read_to_string(&poses).unwrap(), whole[..whole.len() - 5]);
+}
+
+/// Counts of a PUMA's joint 1 fall as it turns the positive way.
+#[test]
+fn the_log_tells_from_which_sides_the_joints_came() {
+    let mut recording = Recording::new();
+    recording.recorder().connect_for_every_settled(connection(), StillnessCriteria::default()).unwrap();
+    recording.sample().sample_at([900, 900, 5, 5, 5, 5]).settle(1_000_000, 900.0, 30_000.0, ALL_HOMED);
+    recording.t_us = 3_000;
+    recording.recorder().lost().unwrap();
+    recording.rule.lose_port();
+    recording.recorder().back().unwrap();
+    recording.greet();
+    recording.settle(4_000_000, 5.0, 30_000.0, ALL_HOMED);
+    recording.recorder.take().unwrap().end().unwrap();
+    let poses = recording.session().join("poses.csv");
+    let whole = fs::read_to_string(&poses).unwrap();
+    let signs: Vec<&str> = whole.lines().skip(1).map(|line| line.split(',').nth(9).unwrap()).collect();
+    assert_eq!(signs, ["-+0000", ""], "{whole}");
+    fs::remove_file(&poses).unwrap();
+    assert_eq!(recover(&SessionLock::acquire(&recording.session()).unwrap()).unwrap(), 2);
+    assert_eq!(fs::read_to_string(&poses).unwrap(), whole);
+}
+
+#[test]
+fn a_session_that_was_begun_without_directions_is_read_and_goes_on_without_them() {
+    let mut recording = Recording::new();
+    recording.connect(Some(connection())).measure(&[1.25], Some(2));
+    // As a program before directions were kept has written it.
+    let (marks, session) = ([2.5, 3.5].map(older_mark), recording.session());
+    marks.iter().for_each(|mark| recording.recorder().frame(mark).unwrap());
+    recording.recorder.take().unwrap().end().unwrap();
+    let (poses, without) = (session.join("poses.csv"), |text: &str| text.replace("approach,", "").replace(",0-0000,", ","));
+    let older = without(&fs::read_to_string(&poses).unwrap());
+    fs::write(&poses, &older).unwrap();
+    let mut recorder = begin(&session);
+    assert_eq!(recorder.recovered(), 2);
+    recorder.connect(Some(connection())).unwrap();
+    let approach = Approach::UNKNOWN.with(0, Some(Direction::Rising));
+    let q = JointVector::zero();
+    let pose = MeasuredPose { q, approach, displacement_m: 0.002, t_s: 4.5, rate_m_s: None, plan_row: Some(3) };
+    recorder.poses(&[pose]).unwrap();
+    recorder.end().unwrap();
+    let text = fs::read_to_string(&poses).unwrap();
+    assert!(text.starts_with(&older) && text.lines().count() == 5, "{text}");
+    assert!(text.lines().all(|line| line.split(',').count() == 14), "{text}");
+    let check = host_cal_in(recording.folder.path(), &["log", "check", "s", "--json"]);
+    assert_eq!((check.code, &check.json()["poses_measured"]), (0, &4.into()), "{}", check.transcript());
+
+    // Written anew, the file has what the log knows.
+    fs::remove_file(&poses).unwrap();
+    assert_eq!(recover(&SessionLock::acquire(&session).unwrap()).unwrap(), 4);
+    let anew = fs::read_to_string(&poses).unwrap();
+    let signs: Vec<&str> = anew.lines().skip(1).map(|line| line.split(',').nth(9).unwrap()).collect();
+    assert_eq!(signs, ["0-0000", "", "", "+00000"], "{anew}");
+}
+
+/// The frame of a pose without directions.
+fn older_mark(t_s: f64) -> Vec<u8> {
+    let pose = MarkedPose { q: vec![0.1; 6], displacement_m: 0.001, t_s, rate_m_s: None, plan_row: None };
+    encode(&(b'P', PoseMark::Measured(pose)), &mut [0; MAX_FRAME]).unwrap().to_vec()
 }
 
 #[test]

@@ -231,3 +231,29 @@ fn terms_are_part_of_the_robot_wherever_it_is_computed_with_or_are_refused_by_na
     assert!(fit["rms_mm"].as_f64().unwrap() < 1e-4, "{}", fit["rms_mm"]);
     assert_eq!(host_cal_in(folder.path(), &[&["rank"], &measured[..]].concat()).code, 0);
 }
+
+#[test]
+fn what_is_simulated_of_a_robot_with_backlash_says_from_which_sides_the_joints_came() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("arm.toml"), with_terms("puma560")).unwrap();
+    let simulate =
+        ["simulate", "--robot", "arm.toml", "--rig", "triangles", "--bar", "460", "--per-pair", "12", "--out", "poses.csv"];
+    runs(&folder, &[&simulate]);
+    let text = fs::read_to_string(folder.path().join("poses.csv")).unwrap();
+    let column = text.lines().next().unwrap().split(',').position(|name| name == "approach").expect("the column is there");
+    let signs: Vec<&str> = text.lines().skip(1).map(|line| line.split(',').nth(column).unwrap()).collect();
+    assert_eq!((signs.len(), signs[0]), (108, ""), "nobody knows where the first came from");
+    assert!(signs[1..].iter().all(|signs| signs.len() == 6 && signs.bytes().all(|sign| b"+-".contains(&sign))), "{signs:?}");
+    // The lengths are those of joints that came so.
+    let validate = ["validate", "--robot", "arm.toml", "--rig", "triangles", "poses.csv", "--json"];
+    let rms_mm = |run: ballbar_tests::command::Run| run.json()["rms_mm"].as_f64().unwrap();
+    assert!(rms_mm(host_cal_in(folder.path(), &validate)) < 1e-5);
+    let without: String = text
+        .lines()
+        .map(|line| {
+            line.split(',').enumerate().filter(|(i, _)| *i != column).map(|(_, field)| field).collect::<Vec<_>>().join(",") + "\n"
+        })
+        .collect();
+    fs::write(folder.path().join("poses.csv"), without).unwrap();
+    assert!(rms_mm(host_cal_in(folder.path(), &validate)) > 0.01);
+}

@@ -1,5 +1,6 @@
 //! The host's end of the wire: the serial port, requests and their replies, what is believed of a stream and what it lost.
 
+mod approach_watch;
 mod current_pose;
 mod encoders;
 mod errors;
@@ -17,6 +18,7 @@ mod tally;
 mod upload;
 mod verify;
 
+pub use approach_watch::ApproachWatch;
 pub use current_pose::current_pose;
 pub use encoders::{NoEncoders, joint_encoders};
 pub use errors::{BoardError, PortError};

@@ -3,7 +3,7 @@
 use ballbar::wire::{Answer, Command, ParameterSet, ParameterSetError, Refusal, Status, WhichSet, term_numbers};
 use ballbar::{
     Chain, Coupling, Encoder, JointEncoders, JointKind, JointTerms, JointVector, LVDT_COEFFICIENTS, LvdtCurve, LvdtReading,
-    SettledPose,
+    MAX_JOINTS, SettledPose,
 };
 use ballbar_calib::kinematics::CanonicalFrames;
 use ballbar_calib::model::Robot;
@@ -111,6 +111,8 @@ fn cut_to<const N: usize>(text: &str, bytes: usize) -> heapless::String<N> {
 pub struct RobotOnBoard {
     set: ParameterSet,
     encoders: JointEncoders<f64>,
+    /// Half of each joint's gap, radians or metres.
+    backlash: [f32; MAX_JOINTS],
 }
 
 impl RobotOnBoard {
@@ -133,7 +135,7 @@ impl RobotOnBoard {
 
     /// Takes a set that came from a board; `None` when it cannot be computed with.
     pub fn new(set: ParameterSet) -> Option<Self> {
-        set.compile().ok()?;
+        let backlash = set.compile().ok()?.backlash;
         let encoders: Vec<_> = set
             .encoders
             .iter()
@@ -145,7 +147,7 @@ impl RobotOnBoard {
             .map(|c| Coupling { joint: c.joint, driven_by: c.driven_by, ratio: f64::from(c.ratio) })
             .collect();
         let encoders = JointEncoders::new(&encoders, &couplings).ok()?;
-        Some(Self { set, encoders })
+        Some(Self { set, encoders, backlash })
     }
 
     /// The set as the board has it.
@@ -167,6 +169,11 @@ impl RobotOnBoard {
     /// The map between counts and joint values.
     pub fn encoders(&self) -> &JointEncoders<f64> {
         &self.encoders
+    }
+
+    /// Half of each joint's gap, radians or metres, as far as the board knows it.
+    pub fn backlash(&self) -> [f64; MAX_JOINTS] {
+        self.backlash.map(f64::from)
     }
 
     /// Whether by this status they were.

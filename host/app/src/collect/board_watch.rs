@@ -3,12 +3,12 @@
 use std::time::{Duration, Instant};
 
 use ballbar::wire::{Answer, Command, Event, Stream, StreamSelection};
-use ballbar::{JointVector, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria};
+use ballbar::{Approach, JointVector, Sample, SettleDetector, SettledPose, Stillness, StillnessCriteria};
 
 use super::check_board::CheckedBoard;
 use super::errors::CollectError;
 use super::track::TrackPoint;
-use crate::board::{BoardError, BoardLink, Frame, Refusals, RobotOnBoard, StreamLosses};
+use crate::board::{ApproachWatch, BoardError, BoardLink, Frame, Refusals, RobotOnBoard, StreamLosses};
 use crate::deadline::StopFlag;
 use crate::session::Recorder;
 
@@ -34,6 +34,8 @@ pub struct View {
 pub struct Stand {
     /// Encoder outputs, means, radians or metres.
     pub q: JointVector<f64>,
+    /// From which sides the joints came there, where it is known.
+    pub approach: Approach,
     /// Mean displacement of the bar from mid travel, metres; `None` beyond it.
     pub displacement_m: Option<f64>,
     /// Beginning of the time of which this is the mean, by the board's clock, microseconds.
@@ -50,6 +52,7 @@ pub struct BoardWatch {
     criteria: StillnessCriteria,
     /// Follows the board's own detector.
     detector: SettleDetector,
+    approach: ApproachWatch,
     period_us: u64,
     refusals: Refusals,
     /// What is to be said of refused messages.
@@ -91,6 +94,7 @@ impl BoardWatch {
         link.act(Command::SetStillness(criteria))?;
         link.start_stream(StreamSelection { samples: true, settled: true, poses: false })?;
         let (refusals, refusal, detector) = (Refusals::default(), None, SettleDetector::new(criteria));
+        let approach = ApproachWatch::new(&robot, &criteria);
         let (heard, period_us) = (Instant::now(), 1_000_000 / u64::from(rate_hz.max(1)));
         let (first, index, view, stand, track, is_watchful) = (None, 0, None, None, None, false);
         Ok(Self {
@@ -99,6 +103,7 @@ impl BoardWatch {
             recorder,
             criteria,
             detector,
+            approach,
             period_us,
             refusals,
             refusal,
@@ -286,18 +291,19 @@ impl BoardWatch {
             None => self.view.and_then(|view| view.off_since_us).or(Some(sample.t_us)),
         };
         self.detector.push(sample);
+        self.approach.take(sample, &q);
         self.first.get_or_insert((sample.t_us, sample.index));
         self.index = sample.index;
         let stillness = self.detector.stillness();
         self.view = Some(View { t_us: sample.t_us, q, displacement_m, is_homed, off_since_us, stillness });
         if let (Some(track), Some(displacement_m)) = (&mut self.track, displacement_m) {
-            track.push(TrackPoint { t_s: sample.t_us as f64 * 1e-6, q, displacement_m });
+            track.push(TrackPoint { t_s: sample.t_us as f64 * 1e-6, q, approach: self.approach.approach(), displacement_m });
         }
     }
 
     fn stand_of(&self, pose: &SettledPose) -> Stand {
         let (q, displacement_m) = self.robot.settled(pose);
         let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
-        Stand { q, displacement_m, began_us: pose.t_us, t_s }
+        Stand { q, approach: self.approach.approach(), displacement_m, began_us: pose.t_us, t_s }
     }
 }

@@ -341,7 +341,8 @@ impl<'a, 'o> Collector<'a, 'o> {
             return self.miss(row, &why);
         }
         let (t_s, plan_row) = (stand.t_s, Some(planned.line));
-        self.board.recorder().poses(&[MeasuredPose { q: stand.q, displacement_m, t_s, rate_m_s: None, plan_row }])?;
+        let (q, approach) = (stand.q, stand.approach);
+        self.board.recorder().poses(&[MeasuredPose { q, approach, displacement_m, t_s, rate_m_s: None, plan_row }])?;
         self.stands.insert(row, stand);
         self.summary.written += 1;
         self.done(row, displacement_m, residual_m)

@@ -3,7 +3,7 @@
 //! Over a piece so short that the arm's speed hardly changes, the means of joints and length belong together as at a single
 //! moment, but for the time by which the LVDT's signal comes late: with the rate of the length it can be removed (see `lag.rs`).
 
-use ballbar::{JointKind, JointVector};
+use ballbar::{Approach, JointKind, JointVector};
 
 use super::collector::Collector;
 use super::errors::CollectError;
@@ -31,6 +31,7 @@ impl Default for TrackOptions {
 pub(super) struct TrackPoint {
     pub(super) t_s: f64,
     pub(super) q: JointVector<f64>,
+    pub(super) approach: Approach,
     pub(super) displacement_m: f64,
 }
 
@@ -41,6 +42,8 @@ pub struct MovingPose {
     pub t_s: f64,
     /// Mean encoder outputs, radians or metres.
     pub q: JointVector<f64>,
+    /// From which sides the joints came there, where it is known; not of a joint that turned meanwhile.
+    pub approach: Approach,
     /// Mean displacement of the bar from mid travel, metres.
     pub displacement_m: f64,
     /// How fast the length grows, metres per second.
@@ -80,12 +83,14 @@ fn mean(points: &[TrackPoint], kinds: &[JointKind]) -> Option<MovingPose> {
             *sum += value / count;
         }
     }
+    let turned = |joint: &usize| points.iter().any(|point| point.approach.direction(*joint) != last.approach.direction(*joint));
+    let approach = (0..kinds.len()).filter(turned).fold(last.approach, |approach, joint| approach.with(joint, None));
     // The line through the samples, by least squares.
     let (along, square) = points.iter().fold((0.0, 0.0), |(along, square), point| {
         let t_s = point.t_s - t_s;
         (along + t_s * (point.displacement_m - displacement_m), square + t_s * t_s)
     });
-    (square > 0.0).then(|| MovingPose { t_s, q, displacement_m, rate_m_s: along / square })
+    (square > 0.0).then(|| MovingPose { t_s, q, approach, displacement_m, rate_m_s: along / square })
 }
 
 impl Collector<'_, '_> {
@@ -101,6 +106,7 @@ impl Collector<'_, '_> {
         let plan_row = (*self.ledger.state(row) == RowState::Todo).then_some(planned.line);
         let measured = |&(pose, _): &(&MovingPose, f64)| MeasuredPose {
             q: pose.q,
+            approach: pose.approach,
             displacement_m: pose.displacement_m,
             t_s: pose.t_s,
             rate_m_s: Some(pose.rate_m_s),
@@ -114,6 +120,8 @@ impl Collector<'_, '_> {
 
 #[cfg(test)]
 mod tests {
+    use ballbar::Direction;
+
     use super::*;
 
     #[test]
@@ -124,7 +132,8 @@ mod tests {
             let way = (t_s - 1.0).clamp(0.0, 2.0);
             let mut q = JointVector::zero();
             q.as_array_mut()[0] = 0.3 * way;
-            TrackPoint { t_s, q, displacement_m: 0.002 * way - 0.001 }
+            let approach = Approach::UNKNOWN.with(0, (t_s > 1.5).then_some(Direction::Rising));
+            TrackPoint { t_s, q, approach, displacement_m: 0.002 * way - 0.001 }
         };
         let points: Vec<TrackPoint> = (0..400).map(point).collect();
         let options = TrackOptions { every_s: 0.25, mean_s: 0.1 };
@@ -135,6 +144,7 @@ mod tests {
             assert!((pose.q.as_array()[0] - 0.3 * way).abs() < 1e-12);
             assert!((pose.displacement_m - (0.002 * way - 0.001)).abs() < 1e-12);
             assert!((pose.rate_m_s - 0.002).abs() < 1e-12);
+            assert_eq!(pose.approach.sign::<f64>(0), if way > 0.55 { 1.0 } else { 0.0 }, "{way}");
         }
     }
 }

@@ -31,7 +31,7 @@ pub use builtin::{RIGS, ROBOTS};
 pub use calibrated::{CalibratedError, calibration, write_calibrated};
 pub use kind::FileKind;
 pub use plan_rows::{read_plan, write_plan};
-pub use poses::{pose_header, pose_record, write_poses};
+pub use poses::{approach_text, pose_header, pose_record, write_poses};
 pub use problem::Problem;
 pub use protect::Refusal;
 pub use read_poses::{append_poses, read_poses};

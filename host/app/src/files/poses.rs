@@ -1,6 +1,6 @@
 //! Writing `poses.csv`: measured lengths and where the robot stood. `read_poses.rs` reads it.
 
-use ballbar::{JointKind, JointVector, Measurement};
+use ballbar::{Approach, JointKind, JointVector, Measurement};
 use ballbar_calib::model::{PoseRow, Rig, Robot};
 
 use crate::units::{ScreenUnit, mm_from_m};
@@ -9,14 +9,24 @@ use crate::units::{ScreenUnit, mm_from_m};
 pub fn write_poses(robot: &Robot, rig: &Rig, rows: &[PoseRow]) -> String {
     let kinds = robot.chain.joint_kinds();
     let has_set = rows.iter().any(|row| row.set.is_some());
-    let mut text = pose_header(kinds, if has_set { &["set"] } else { &[] }) + "\n";
+    let has_approach = rows.iter().any(|row| row.approach != Approach::UNKNOWN);
+    let optional =
+        [(has_approach, "approach"), (has_set, "set")].into_iter().filter_map(|(is_there, name)| is_there.then_some(name));
+    let mut text = pose_header(kinds, &optional.collect::<Vec<_>>()) + "\n";
     for row in rows {
         let (chuck, sphere) = (&rig.chucks[row.pairing.chuck].name, &rig.spheres[row.pairing.sphere].name);
+        let approach = has_approach.then(|| approach_text(row.approach, kinds.len()));
         let set = has_set.then(|| row.set.clone().unwrap_or_default());
+        let optional: Vec<String> = approach.into_iter().chain(set).collect();
         let Measurement { q, length_m, .. } = &row.measurement;
-        text += &(pose_record(chuck, sphere, kinds, q, *length_m, set.as_slice()) + "\n");
+        text += &(pose_record(chuck, sphere, kinds, q, *length_m, &optional) + "\n");
     }
     text
+}
+
+/// One of `+`, `-` and `0` for each joint; empty where nothing is known.
+pub fn approach_text(approach: Approach, joints: usize) -> String {
+    if approach == Approach::UNKNOWN { String::new() } else { approach.signs(joints).to_string() }
 }
 
 /// The first line of a file of poses, with optional columns at its end.

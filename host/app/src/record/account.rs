@@ -189,6 +189,9 @@ impl Account {
             Event::Samples(batch) => {
                 let bar_mm = self.bar_mm();
                 self.counts.samples += batch.len() as u64;
+                if let Some(robot) = &self.watched.robot {
+                    self.rule.take_samples(robot, batch);
+                }
                 for sample in batch.samples() {
                     let now = (sample.t_us, sample.index);
                     self.clock = Some([self.clock.map_or(now, |[first, _]| first), now]);

@@ -7,8 +7,8 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
-use ballbar::JointKind;
 use ballbar::wire::{Answer, Event, LogMark, ToHost};
+use ballbar::{Approach, JointKind};
 
 use super::log::{LogError, LogReader};
 use super::measured_pose::{Connection, MeasuredPose};
@@ -94,10 +94,15 @@ impl LoggedPoses {
             }
             ToHost::Stream(stream) => {
                 self.undecided = None;
-                if let (Event::Settled(pose), Some(rule), Some((robot, _))) = (&stream.event, &mut self.rule, &self.robot)
-                    && let SettledFate::Kept(pose) = rule.judge(robot, pose, stream.homed)
-                {
-                    self.undecided = Some(pose);
+                let (Some(rule), Some((robot, _))) = (&mut self.rule, &self.robot) else { return };
+                match &stream.event {
+                    Event::Samples(batch) => rule.take_samples(robot, batch),
+                    Event::Settled(pose) => {
+                        if let SettledFate::Kept(pose) = rule.judge(robot, pose, stream.homed) {
+                            self.undecided = Some(pose);
+                        }
+                    }
+                    Event::Poses(_) => {}
                 }
             }
         }
@@ -147,7 +152,8 @@ impl LoggedPoses {
                 self.rule = every_settled.map(SettledRule::new);
             }
             PoseMark::Disconnected => (self.connection, self.rule) = (None, None),
-            PoseMark::Measured(pose) => self.keep(pose.into()),
+            PoseMark::Measured(pose) => self.keep(pose.measured(Approach::UNKNOWN)),
+            PoseMark::Approached { pose, approach } => self.keep(pose.measured(*approach)),
             PoseMark::Erased { times_us, goes_on } => {
                 self.erasing_us.extend(times_us);
                 if !goes_on {
@@ -191,6 +197,7 @@ mod tests {
         let connection = Connection { chuck: "A".into(), sphere: "1".into(), bar_m: 0.46 };
         let pose = |i: u64| MeasuredPose {
             q: JointVector::zero(),
+            approach: Approach::UNKNOWN,
             displacement_m: 0.0,
             t_s: i as f64,
             rate_m_s: None,

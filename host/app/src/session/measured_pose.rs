@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use ballbar::JointVector;
+use ballbar::{Approach, JointVector};
 use serde::{Deserialize, Serialize};
 
 use crate::units::{mm_from_m, tidy};
@@ -30,6 +30,8 @@ impl fmt::Display for Connection {
 pub struct MeasuredPose {
     /// Encoder outputs, radians or metres.
     pub q: JointVector<f64>,
+    /// From which sides the joints came there, where it is known.
+    pub approach: Approach,
     /// Displacement of the bar from mid travel, metres.
     pub displacement_m: f64,
     /// Time of its middle by the board's clock, seconds.

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use ballbar::{JointKind, JointVector};
+use ballbar::{Approach, JointKind, JointVector};
 
 use super::own_file::{ForeignChange, OwnFile};
 use super::pose_file_error::PoseFileError;
-use super::pose_lines::{self, COLUMNS, plan_row};
-use crate::files::{pose_header, pose_record};
+use super::pose_lines::{self, APPROACH, COLUMNS, plan_row};
+use crate::files::{approach_text, pose_header, pose_record};
 use crate::units::{mm_from_m, tidy};
 
 /// A settled pose as it goes into the file.
@@ -19,6 +19,8 @@ pub struct SettledRow<'a> {
     pub sphere: &'a str,
     /// Joint values, radians or metres.
     pub q: JointVector<f64>,
+    /// From which sides the joints came there, where it is known.
+    pub approach: Approach,
     /// Length of the bar as measured, metres.
     pub length_m: f64,
     /// Time of the middle of the pose by the board's clock, seconds.
@@ -38,6 +40,8 @@ pub struct PoseFile {
     file: OwnFile,
     kinds: Vec<JointKind>,
     header: String,
+    /// A file that was begun before directions were kept goes on without them.
+    has_approach: bool,
     added: usize,
 }
 
@@ -64,11 +68,13 @@ impl PoseFile {
     /// [`PoseFileError`] when the file is there and is not one of this robot's, whole in every line.
     pub fn open(path: &Path, kinds: &[JointKind]) -> Result<Self, PoseFileError> {
         let file = OwnFile::read(path).map_err(|error| PoseFileError::Unreadable { path: path.to_owned(), error })?;
-        let header = pose_header(kinds, &COLUMNS);
+        let older = pose_header(kinds, &COLUMNS.into_iter().filter(|column| *column != APPROACH).collect::<Vec<_>>());
+        let is_older = file.text().is_some_and(|text| pose_lines::header(text) == older);
+        let header = if is_older { older } else { pose_header(kinds, &COLUMNS) };
         if let Some(text) = file.text() {
             pose_lines::check(path, text, &header)?;
         }
-        Ok(Self { file, kinds: kinds.to_vec(), header, added: 0 })
+        Ok(Self { file, kinds: kinds.to_vec(), header, has_approach: !is_older, added: 0 })
     }
 
     /// Kinds of the robot's joints.
@@ -118,8 +124,10 @@ impl PoseFile {
         let plan_row = row.plan_row.map_or_else(String::new, |row| row.to_string());
         let rate = row.rate_m_s.map_or_else(String::new, |rate_m_s| format!("{:.6}", mm_from_m(rate_m_s)));
         let lag = row.rate_m_s.map_or_else(String::new, |_| "0".into());
-        let optional = [time_text(row.t_s), tidy(mm_from_m(row.bar_m)).to_string(), plan_row, rate, lag];
-        pose_record(row.chuck, row.sphere, &self.kinds, &row.q, row.length_m, &optional)
+        let approach = approach_text(row.approach, self.kinds.len());
+        let optional = [approach, time_text(row.t_s), tidy(mm_from_m(row.bar_m)).to_string(), plan_row, rate, lag];
+        let optional = if self.has_approach { &optional[..] } else { &optional[1..] };
+        pose_record(row.chuck, row.sphere, &self.kinds, &row.q, row.length_m, optional)
     }
 
     /// Takes the latest pose out again, with all others before it of the same line of plan.csv, and writes the file.
@@ -219,8 +227,18 @@ mod tests {
     const KINDS: [JointKind; 1] = [JointKind::Revolute];
 
     fn row(plan_row: Option<usize>) -> SettledRow<'static> {
-        let q = JointVector::zero();
-        SettledRow { chuck: "A", sphere: "1", q, length_m: 0.46, t_s: 1.0, bar_m: 0.46, rate_m_s: Some(0.002), plan_row }
+        let (q, approach) = (JointVector::zero(), Approach::UNKNOWN);
+        SettledRow {
+            chuck: "A",
+            sphere: "1",
+            q,
+            approach,
+            length_m: 0.46,
+            t_s: 1.0,
+            bar_m: 0.46,
+            rate_m_s: Some(0.002),
+            plan_row,
+        }
     }
 
     #[test]
@@ -245,7 +263,7 @@ mod tests {
         let path = folder.path().join("poses.csv");
         PoseFile::open(&path, &KINDS).unwrap().add([row(Some(2)), row(Some(3))]).unwrap();
         let text = std::fs::read_to_string(&path).unwrap().replacen("\nA", "\r\n# a remark\n\nA", 1);
-        std::fs::write(&path, format!("# by Ann\n{text}# A,1,0,460,2,460,,,\n")).unwrap();
+        std::fs::write(&path, format!("# by Ann\n{text}# A,1,0,460,,2,460,,,\n")).unwrap();
         let before = std::fs::read_to_string(&path).unwrap();
         let mut file = PoseFile::open(&path, &KINDS).unwrap();
         assert_eq!(file.times_us().collect::<Vec<_>>(), [1_000_000, 1_000_000, 2_000_000], "a pose commented out is there");
@@ -259,8 +277,8 @@ mod tests {
         assert_eq!(
             corrected,
             before
-                .replace("460.000000,1.000000,460,2,2.000000,0", "460.008000,1.000000,460,2,2.000000,4")
-                .replace("460.000000,1.000000,460,3,2.000000,0", "460.008000,1.000000,460,3,2.000000,4")
+                .replace("460.000000,,1.000000,460,2,2.000000,0", "460.008000,,1.000000,460,2,2.000000,4")
+                .replace("460.000000,,1.000000,460,3,2.000000,0", "460.008000,,1.000000,460,3,2.000000,4")
         );
     }
 

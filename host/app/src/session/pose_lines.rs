@@ -5,7 +5,9 @@ use std::path::Path;
 use super::pose_file_error::{Damage, PoseFileError};
 
 /// The optional columns that a session's poses have, after the length.
-pub(super) const COLUMNS: [&str; 5] = ["t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
+pub(super) const COLUMNS: [&str; 6] = [APPROACH, "t_s", "bar_mm", "plan_row", "rate_mm_s", "lag_ms"];
+/// The first of them, which sessions do not have that were begun before it was kept.
+pub(super) const APPROACH: &str = "approach";
 /// Where some of them stand, counted from the end of a line.
 const TIME_FROM_END: usize = 4;
 const PLAN_ROW_FROM_END: usize = 2;
@@ -38,6 +40,7 @@ fn check_row(row: &str, header: &str) -> Result<(), Damage> {
     if fields.len() != columns.len() {
         return Err(Damage::FieldCount { found: fields.len(), expected: columns.len() });
     }
+    let joints = columns.iter().filter(|column| column.starts_with('q')).count();
     let moving = fields.iter().rev().take(2).any(|field| !field.is_empty());
     for (column, field) in columns.iter().zip(&fields) {
         let number = field.parse::<f64>().ok().filter(|number| number.is_finite() && number.abs() <= MOST);
@@ -45,6 +48,7 @@ fn check_row(row: &str, header: &str) -> Result<(), Damage> {
             "chuck" | "sphere" => (!field.is_empty(), "a name"),
             "length_mm" | "bar_mm" => (number.is_some_and(|number| number > 0.0), "a number above 0, at most 1e6"),
             "t_s" => (us_of_text(field).is_some(), "a time in seconds"),
+            APPROACH => (is_approach(field, joints), "+, - or 0 for each joint, or nothing"),
             "plan_row" => (field.is_empty() || field.parse::<usize>().is_ok(), "a line of plan.csv, or nothing"),
             "rate_mm_s" | "lag_ms" if !moving => (true, ""),
             _ => (number.is_some(), "a number from -1e6 to 1e6"),
@@ -54,6 +58,10 @@ fn check_row(row: &str, header: &str) -> Result<(), Damage> {
         }
     }
     Ok(())
+}
+
+fn is_approach(field: &str, joints: usize) -> bool {
+    field.is_empty() || (field.len() == joints && field.bytes().all(|sign| b"+-0".contains(&sign)))
 }
 
 /// No length, angle, rate or lag is larger.
@@ -69,6 +77,11 @@ pub(super) fn split_header(text: &str) -> (&str, &str) {
     let before: usize = text.split_inclusive('\n').take_while(|line| !is_row(line)).map(str::len).sum();
     let header = text[before..].find('\n').map_or(text.len() - before, |end| end + 1);
     text.split_at(before + header)
+}
+
+/// The header of a text; empty where it has none.
+pub(super) fn header(text: &str) -> &str {
+    text.lines().find(|line| is_row(line)).unwrap_or_default().trim_end()
 }
 
 /// The poses of a text.
@@ -111,8 +124,8 @@ fn shown(text: &str) -> String {
 mod tests {
     use super::*;
 
-    const HEADER: &str = "chuck,sphere,q1_deg,length_mm,t_s,bar_mm,plan_row,rate_mm_s,lag_ms";
-    const ROW: &str = "A,1,1.5,460.25,12.000001,460,,,";
+    const HEADER: &str = "chuck,sphere,q1_deg,length_mm,approach,t_s,bar_mm,plan_row,rate_mm_s,lag_ms";
+    const ROW: &str = "A,1,1.5,460.25,+,12.000001,460,,,";
 
     #[test]
     fn every_kind_of_damage_is_found_at_its_line() {
@@ -122,21 +135,23 @@ mod tests {
         check(path, &good.replace('\n', "\r\n"), HEADER).unwrap();
         let of_line = |row: &str| good.clone() + row;
         let cases = [
-            (of_line("A,1,1.5,460.25,12.00"), "poses.csv:8: 5 fields, expected 9"),
+            (of_line("A,1,1.5,460.25,+,12.00"), "poses.csv:8: 6 fields, expected 10"),
             (of_line(ROW), "poses.csv:8: the file ends within"),
             (good.trim_end().to_owned(), "poses.csv:7: the file ends within"),
             (of_line(&format!("{HEADER}\n")), "poses.csv:8: the header stands here again"),
-            (of_line("A,1,1.5,460.25,12.0,460,,,,\n"), "poses.csv:8: 10 fields"),
-            (of_line("A,1,NaN,460.25,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: `NaN`"),
-            (of_line("A,1,1e9,460.25,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: `1e9`"),
-            (of_line("A,1,,460.25,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: ``"),
-            (of_line("A,1,1.5,-3,12.0,460,,,\n"), "poses.csv:8: column `length_mm`: `-3`"),
-            (of_line("A,1,1.5,460.25,soon,460,,,\n"), "poses.csv:8: column `t_s`: `soon`"),
-            (of_line("A,1,1.5,460.25,12.0,460,x,,\n"), "poses.csv:8: column `plan_row`: `x`"),
-            (of_line("A,1,1.5,460.25,12.0,460,,3.5,\n"), "poses.csv:8: column `lag_ms`: ``"),
-            (of_line(",1,1.5,460.25,12.0,460,,,\n"), "poses.csv:8: column `chuck`: ``"),
+            (of_line("A,1,1.5,460.25,+,12.0,460,,,,\n"), "poses.csv:8: 11 fields"),
+            (of_line("A,1,NaN,460.25,+,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: `NaN`"),
+            (of_line("A,1,1e9,460.25,+,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: `1e9`"),
+            (of_line("A,1,,460.25,+,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: ``"),
+            (of_line("A,1,1.5,-3,,12.0,460,,,\n"), "poses.csv:8: column `length_mm`: `-3`"),
+            (of_line("A,1,1.5,460.25,,soon,460,,,\n"), "poses.csv:8: column `t_s`: `soon`"),
+            (of_line("A,1,1.5,460.25,+,12.0,460,x,,\n"), "poses.csv:8: column `plan_row`: `x`"),
+            (of_line("A,1,1.5,460.25,+,12.0,460,,3.5,\n"), "poses.csv:8: column `lag_ms`: ``"),
+            (of_line("A,1,1.5,460.25,++,12.0,460,,,\n"), "poses.csv:8: column `approach`: `++`"),
+            (of_line("A,1,1.5,460.25,x,12.0,460,,,\n"), "poses.csv:8: column `approach`: `x`"),
+            (of_line(",1,1.5,460.25,+,12.0,460,,,\n"), "poses.csv:8: column `chuck`: ``"),
             (of_line("\u{1b}[2J\n"), "poses.csv:8: 1 fields"),
-            (of_line("A,1,\u{1b}[2J,460.25,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: ` [2J`"),
+            (of_line("A,1,\u{1b}[2J,460.25,+,12.0,460,,,\n"), "poses.csv:8: column `q1_deg`: ` [2J`"),
             (format!("{HEADER},x\n"), "poses.csv:1: the columns are"),
             (String::new(), "poses.csv:1: the columns are ``"),
             (good.replacen("length_mm", "q1_deg", 1), "poses.csv:3: the columns are"),

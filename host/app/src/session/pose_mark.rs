@@ -4,7 +4,7 @@
 //! another firmware, or for older logs to be of another version.
 
 use ballbar::wire::{MAX_FRAME, decode, encode};
-use ballbar::{JointVector, StillnessCriteria};
+use ballbar::{Approach, JointVector, StillnessCriteria};
 use serde::{Deserialize, Serialize};
 
 use super::measured_pose::{Connection, MeasuredPose};
@@ -21,7 +21,7 @@ pub enum PoseMark {
     },
     /// From here on the bar is off, or nobody knows what it joins.
     Disconnected,
-    /// A pose was measured with the bar as it is connected. It goes to poses.csv next.
+    /// A pose was measured with the bar as it is connected, by a program that kept no directions. It goes to poses.csv next.
     Measured(MarkedPose),
     /// The latest poses of these times were taken out of poses.csv again.
     Erased {
@@ -29,6 +29,13 @@ pub enum PoseMark {
         times_us: Vec<u64>,
         /// The next mark has more of them. Poses are erased by the last of a row of marks, or not at all.
         goes_on: bool,
+    },
+    /// A pose was measured with the bar as it is connected. It goes to poses.csv next.
+    Approached {
+        /// The pose.
+        pose: MarkedPose,
+        /// From which sides the joints came there, where it is known.
+        approach: Approach,
     },
 }
 
@@ -74,19 +81,20 @@ impl PoseMark {
 
     /// A pose of a robot with so many joints.
     pub(super) fn measured(pose: &MeasuredPose, joints: usize) -> Self {
-        let MeasuredPose { q, displacement_m, t_s, rate_m_s, plan_row } = *pose;
+        let MeasuredPose { q, approach, displacement_m, t_s, rate_m_s, plan_row } = *pose;
         let q = q.as_array().iter().copied().take(joints).collect();
-        Self::Measured(MarkedPose { q, displacement_m, t_s, rate_m_s, plan_row })
+        Self::Approached { pose: MarkedPose { q, displacement_m, t_s, rate_m_s, plan_row }, approach }
     }
 }
 
-impl From<&MarkedPose> for MeasuredPose {
-    fn from(pose: &MarkedPose) -> Self {
+impl MarkedPose {
+    /// The pose, approached so.
+    pub(super) fn measured(&self, approach: Approach) -> MeasuredPose {
         let mut q = JointVector::zero();
-        for (value, marked) in q.as_array_mut().iter_mut().zip(&pose.q) {
+        for (value, marked) in q.as_array_mut().iter_mut().zip(&self.q) {
             *value = *marked;
         }
-        let MarkedPose { displacement_m, t_s, rate_m_s, plan_row, .. } = *pose;
-        Self { q, displacement_m, t_s, rate_m_s, plan_row }
+        let Self { displacement_m, t_s, rate_m_s, plan_row, .. } = *self;
+        MeasuredPose { q, approach, displacement_m, t_s, rate_m_s, plan_row }
     }
 }

@@ -214,6 +214,7 @@ impl<'a> SettledRow<'a> {
             chuck,
             sphere,
             q: pose.q,
+            approach: pose.approach,
             length_m: bar_m + pose.displacement_m,
             t_s: pose.t_s,
             bar_m: *bar_m,

@@ -1,9 +1,10 @@
 //! Which settled poses are measured where nobody chooses: one rule for a recording under way and for what its log is found to hold.
 
-use ballbar::{SettledPose, StillnessCriteria};
+use ballbar::wire::SampleBatch;
+use ballbar::{Approach, SettledPose, StillnessCriteria};
 
 use super::measured_pose::MeasuredPose;
-use crate::board::RobotOnBoard;
+use crate::board::{ApproachWatch, RobotOnBoard};
 
 /// Follows the settled poses of a run.
 #[derive(Clone, Debug)]
@@ -12,6 +13,8 @@ pub struct SettledRule {
     last_kept: Option<SettledPose>,
     /// The pose that was kept last, when the port was lost since: an arm that still stands there settles again.
     doubtful: Option<SettledPose>,
+    /// Where samples come beside the poses.
+    approach: Option<ApproachWatch>,
 }
 
 /// What becomes of a settled pose.
@@ -30,12 +33,21 @@ pub enum SettledFate {
 impl SettledRule {
     /// At the beginning of a run in which this counts as standing still.
     pub fn new(criteria: StillnessCriteria) -> Self {
-        Self { criteria, last_kept: None, doubtful: None }
+        Self { criteria, last_kept: None, doubtful: None, approach: None }
     }
 
     /// The port was lost.
     pub fn lose_port(&mut self) {
         self.doubtful = self.last_kept.take().or(self.doubtful.take());
+        self.approach = None;
+    }
+
+    /// Samples that came before the next settled pose: from which sides the joints come.
+    pub fn take_samples(&mut self, robot: &RobotOnBoard, batch: &SampleBatch) {
+        let watch = self.approach.get_or_insert_with(|| ApproachWatch::new(robot, &self.criteria));
+        for sample in batch.samples() {
+            watch.take(&sample, &robot.q(sample.counts.iter().map(|&counts| f64::from(counts))));
+        }
     }
 
     /// What becomes of the next settled pose; bit i of `homed` is encoder i.
@@ -51,7 +63,8 @@ impl SettledRule {
             return SettledFate::SameStand;
         }
         let t_s = (pose.t_us as f64 + f64::from(pose.duration_us) / 2.0) * 1e-6;
-        SettledFate::Kept(MeasuredPose { q, displacement_m, t_s, rate_m_s: None, plan_row: None })
+        let approach = self.approach.as_ref().map_or(Approach::UNKNOWN, ApproachWatch::approach);
+        SettledFate::Kept(MeasuredPose { q, approach, displacement_m, t_s, rate_m_s: None, plan_row: None })
     }
 }
 

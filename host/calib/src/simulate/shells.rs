@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use ballbar::{Kinematics, Vector3};
+use ballbar::{Approach, Direction, JointVector, Kinematics, TermKind, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -72,7 +72,8 @@ impl Shells<'_> {
     /// Finds the poses and measures them; `on_pose` is called after each.
     ///
     /// Points are spread evenly over the area of the hemisphere. The arm's posture is what a random start within the joint
-    /// limits leads to, so that wrists and elbows vary as the fit needs them to.
+    /// limits leads to, so that wrists and elbows vary as the fit needs them to. Where the true robot's joints have backlash, it goes straight from
+    /// each pose to the next, and the rows say from which sides the joints came.
     ///
     /// ```
     /// use ballbar_calib::designs;
@@ -99,6 +100,8 @@ impl Shells<'_> {
     pub fn simulate(&self, mut on_pose: impl FnMut()) -> Result<Vec<ShellPose>, ShellError> {
         let planned = Skeleton::of(self.planned_with);
         let truth = self.truth.kinematics();
+        let backlash = |joint| self.truth.terms.coefficient(joint, TermKind::Backlash);
+        let has_backlash = (0..self.truth.chain.joints()).any(|joint| backlash(joint) != 0.0);
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         // Noise has a stream of its own: its size changes no pose, as long as it keeps the length within the bar's travel.
         let mut noise_rng = ChaCha8Rng::seed_from_u64(self.seed);
@@ -111,7 +114,9 @@ impl Shells<'_> {
             while found < self.per_pairing && starts < STARTS_PER_POSE * (found + FIRST_POSES) {
                 starts += 1;
                 let noise_m = normal.map_or(0.0, |normal| normal.sample(&mut noise_rng));
-                if let Some(pose) = self.attempt(&planned, &truth, pairing, noise_m, &mut rng) {
+                let before = poses.last().map(|pose: &ShellPose| pose.row.measurement.q);
+                let before = before.as_ref().filter(|_| has_backlash);
+                if let Some(pose) = self.attempt(&planned, &truth, pairing, before, noise_m, &mut rng) {
                     poses.push(pose);
                     found += 1;
                     on_pose();
@@ -135,6 +140,7 @@ impl Shells<'_> {
         planned: &Skeleton,
         truth: &Kinematics<f64>,
         id: PairingId,
+        before: Option<&JointVector<f64>>,
         noise_m: f64,
         rng: &mut ChaCha8Rng,
     ) -> Option<ShellPose> {
@@ -151,16 +157,26 @@ impl Shells<'_> {
         if !self.planned_with.limits.iter().zip(q.as_array()).all(|(limits, &q)| limits.contain(q)) {
             return None;
         }
-        let length_m = truth.length(&q, &pairing) + noise_m;
+        let approach = before.map_or(Approach::UNKNOWN, |before| approach(before, &q));
+        let length_m = truth.configuration(&q, approach).length(&pairing) + noise_m;
         let within_travel = self.rig.bar.as_ref().is_none_or(|bar| (length_m - self.bar_m).abs() <= bar.travel_m / 2.0);
         (within_travel && length_m > 0.0).then(|| ShellPose {
             row: PoseRow {
                 set: Some(tidy(mm_from_m(self.bar_m)).to_string()),
                 bar_m: Some(self.bar_m),
+                approach,
                 ..PoseRow::of(id, ballbar::Measurement::new(pairing, q, length_m))
             },
             latitude_rad,
             longitude_rad,
         })
     }
+}
+
+/// From which sides joints come that go straight from one place to another.
+fn approach(from: &JointVector<f64>, to: &JointVector<f64>) -> Approach {
+    let ways = from.as_array().iter().zip(to.as_array()).enumerate();
+    ways.filter(|(_, (from, to))| from != to).fold(Approach::UNKNOWN, |approach, (joint, (from, to))| {
+        approach.with(joint, Some(if to > from { Direction::Rising } else { Direction::Falling }))
+    })
 }

@@ -144,7 +144,7 @@ fn text_of(mark: &PoseMark) -> String {
     match mark {
         PoseMark::Connected { connection, .. } => format!("the bar joins {connection}"),
         PoseMark::Disconnected => "the bar is off, or nobody knows what it joins".into(),
-        PoseMark::Measured(pose) => format!("the pose of {:.6} s was measured", pose.t_s),
+        PoseMark::Measured(pose) | PoseMark::Approached { pose, .. } => format!("the pose of {:.6} s was measured", pose.t_s),
         PoseMark::Erased { times_us, .. } => {
             let times: Vec<String> = times_us.iter().map(|&t_us| format!("{:.6} s", t_us as f64 * 1e-6)).collect();
             format!("poses were erased: {}", times.join(", "))
