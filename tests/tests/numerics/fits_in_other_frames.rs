@@ -8,6 +8,7 @@ use ballbar_calib::model::{Dataset, JointLimits, NamedPoint, PairingId, PoseRow,
 use ballbar_calib::simulate::Shells;
 use ballbar_calib::unknowns::Kind;
 use ballbar_tests::at_length::at_length;
+use ballbar_tests::command::host_cal_in;
 use ballbar_tests::data::real_data;
 use ballbar_tests::experiment::dataset;
 use ballbar_tests::frames::{random_chain, rewritten};
@@ -15,6 +16,7 @@ use ballbar_tests::plans::plausible_robot;
 use host_cal::files::{open_rig, open_robot, read_poses};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
 
 /// A millionth of a millimetre.
 const SAME_M: f64 = 1e-9;
@@ -227,4 +229,24 @@ fn a_ur5_by_its_own_table_is_fitted_as_it_is_in_near_frames() {
     }
     let off_m = apart_m(&one.solution.chain, &other.solution.chain, &near);
     assert!(off_m < 1e-6, "{off_m} m");
+}
+
+#[test]
+fn what_poses_tell_of_a_ur5_is_the_same_by_its_own_table() {
+    let Some(folder) = real_data("cases/far_frames") else { return };
+    let [near, far] = ["near.toml", "far2.toml"].map(|name| {
+        let run = host_cal_in(&folder, &["rank", "--robot", name, "--rig", "triangles", "s.csv", "--json"]);
+        assert_eq!(run.code, 0, "{}", run.transcript());
+        run.json()
+    });
+    for key in ["poses", "rank", "parameters", "bound_by_pairings", "not_identified", "remarks", "warnings"] {
+        assert_eq!(near[key], far[key], "{key}");
+    }
+    let values = |json: &Value| -> Vec<f64> {
+        let values = json["singular_values"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap());
+        values.take(json["rank"].as_u64().unwrap() as usize).collect()
+    };
+    for (near, far) in values(&near).into_iter().zip(values(&far)) {
+        assert!((near / far - 1.0).abs() < 1e-6, "{near} {far}");
+    }
 }

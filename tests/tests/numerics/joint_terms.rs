@@ -223,7 +223,7 @@ fn terms_that_no_robot_has_are_refused_by_name() {
         assert_eq!(check(&|terms| terms.masses.links[1].mass_kg = bad), Err(TermsError::Mass { joint: 1 }));
         assert_eq!(check(&|terms| terms.masses.payload.mass_kg = bad), Err(TermsError::Mass { joint: 2 }));
     }
-    assert_eq!(check(&|terms| terms.masses.links[0].center_m.y = 101.0), Err(TermsError::Mass { joint: 0 }));
+    assert_eq!(check(&|terms| terms.masses.links[0].center_m.y = 1001.0), Err(TermsError::Mass { joint: 0 }));
     assert_eq!(check(&|terms| terms.masses.links[2].mass_kg = 1.0), Err(TermsError::NoSuchJoint { joint: 2 }));
     assert_eq!(check(&|terms| terms.masses.gravity_base_m_s2.x = f64::NAN), Err(TermsError::Gravity));
 }

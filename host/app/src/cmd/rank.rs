@@ -1,6 +1,8 @@
 //! `host-cal rank`: what a set of poses can identify.
 
 use ballbar_calib::identify::{Identifiability, bound_by_pairings, remarks};
+use ballbar_calib::kinematics::CanonicalFrames;
+use ballbar_calib::model::Robot;
 use clap::Args;
 use serde::Serialize;
 
@@ -65,6 +67,10 @@ impl RankArgs {
 
 fn report(measured: Measured) -> RankReport {
     let Measured { robot, rig, dataset, warnings, .. } = measured;
+    // As `fit` judges: what the poses tell of a robot does not depend on how its frames are written.
+    let frames = CanonicalFrames::new(&robot.chain);
+    let (chain, terms) = (frames.chain().clone(), frames.terms(&robot.terms));
+    let robot = Robot { chain, terms, ..robot };
     let found = Identifiability::of_robot(&robot, &dataset);
     RankReport {
         poses: dataset.rows.len(),
@@ -91,6 +97,7 @@ impl Report for RankReport {
             self.rank, self.parameters, self.independent_expected, self.bound_by_pairings
         );
         text += &self.spectrum_text();
+        text += "parameters are those of canonical frames, however the file's frames are written (docs/model.md)\n";
         text += &format!("\nnoise of these lengths, as far as no parameter explains it: {:.4} mm RMS\n", self.noise_mm);
         for remark in &self.remarks {
             text += &format!("\n{remark}\n");
