@@ -13,8 +13,8 @@ use crate::remedies::Remedied;
 #[derive(Args)]
 pub(super) struct UnknownArgs {
     /// What is not known beside the robot and is found out with it: the zero of the bar or of each rod, the bar's gain or latency, where
-    /// chucks and spheres are (within `tolerance_mm` of the rig file), an offset of each set, how far joints yield to the masses they
-    /// bear, encoders are off their axes, and joints lag behind them
+    /// chucks and spheres are (within `tolerance_mm` of the rig file), an offset of each set, a drift from the first pose to the last, how far
+    /// joints yield to the masses they bear, encoders are off their axes, and joints lag behind them
     #[arg(long, value_name = "KIND,…", value_delimiter = ',', value_parser = kinds())]
     unknown: Vec<Kind>,
 }
