@@ -104,6 +104,11 @@ impl Unknowns {
         self.others.iter().map(AnyBlock::kind).collect()
     }
 
+    /// How many unknowns each of the other blocks has.
+    pub(crate) fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
     /// The unknowns, the chain's first, in parameter order.
     pub fn list(&self) -> &[Unknown] {
         &self.list
