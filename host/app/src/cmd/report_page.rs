@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
-use ballbar_calib::identify::{FitOptions, fit, remarks};
+use ballbar_calib::identify::{FitOptions, remarks};
 use ballbar_calib::model::Dataset;
 use clap::Args;
 use miette::Diagnostic;
@@ -16,7 +16,6 @@ use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_files};
 use super::unknowns::UnknownArgs;
 use crate::files::{FileKind, Output, read_poses};
-use crate::remedies::Remedied;
 use crate::report::{Facts, Figure, Inputs, figures, html, parameters_table};
 use crate::session::poses_of;
 use crate::text::one_line;
@@ -114,9 +113,8 @@ impl ReportArgs {
         let others = self.others(&measured)?;
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;
-        let unknowns = self.unknowns.blocks(&measured.robot, &measured.rig, &measured.dataset)?;
-        let fit =
-            fit(&measured.robot, &measured.dataset, &FitOptions { hold, unknowns, ..FitOptions::default() }).map_err(Remedied)?;
+        let options = FitOptions { hold, ..FitOptions::default() };
+        let (fit, _) = self.unknowns.fit(&measured.robot, &measured.rig, &measured.dataset, &options)?;
 
         let remarks = remarks(&measured.robot.chain, &measured.dataset, &measured.rig, &measured.robot.limits);
         let unseen: Vec<(String, &Dataset)> =
