@@ -276,6 +276,7 @@ fn a_chuck_that_is_off_is_named_where_it_may_be() {
     let document = fit_json(&folder, &["--rig", rig.to_str().unwrap(), "poses.csv"]);
     let first = &document["unknowns"]["would_explain"][0];
     assert_eq!(first["kind"], "rig", "{}", document["unknowns"]);
+    assert!(first["sentence"].as_str().unwrap().contains("most of all chuck B"), "{first}");
     // Nobody has said that it may be elsewhere.
     let document = fit_json(&folder, &["--rig", "rig_B_2mm_off.toml", "poses.csv"]);
     let refused = document["unknowns"]["cannot_tell"].as_array().unwrap().iter().find(|line| line["kind"] == "rig").unwrap();

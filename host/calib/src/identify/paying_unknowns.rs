@@ -8,8 +8,8 @@ use super::scores::{UnknownScore, unknown_scores};
 use crate::model::{Dataset, Rig, Robot};
 use crate::unknowns::{AnyBlock, Kind};
 
-/// Less probable than this where nothing is off, a kind is tried: of ten kinds, in one clean fit of twenty. Poses left out refuse most of these.
-const WORTH_A_TRY: f64 = 5e-3;
+/// Less probable than this where nothing is off, a kind is tried: of ten kinds, in one clean fit of forty. Poses left out refuse some of these.
+const WORTH_A_TRY: f64 = 2.5e-3;
 
 /// A kind that was tried, by what residuals said, and what poses left out say of it.
 #[derive(Clone, Debug, PartialEq)]

@@ -61,6 +61,8 @@ pub struct ScoreEstimate {
     pub value: f64,
     /// Standard deviation, SI.
     pub std: f64,
+    /// By how much `Σ f²/σ² + (change/tolerance)²` would fall with it alone.
+    pub fall_alone: f64,
 }
 
 /// Why there is no score of a kind.
@@ -127,10 +129,9 @@ impl UnknownScore {
         self.p_value < SIGNIFICANT
     }
 
-    /// The unknown that is off by the most of its standard deviations.
+    /// The unknown that would explain the most alone.
     pub fn largest(&self) -> Option<&ScoreEstimate> {
-        let size = |estimate: &ScoreEstimate| (estimate.value / estimate.std).abs();
-        self.estimates.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
+        self.estimates.iter().max_by(|a, b| a.fall_alone.total_cmp(&b.fall_alone))
     }
 
     /// What it would be: `a bar zero of +0.825 mm`, or `joints that yield to gravity, most of all compliance2 of +0.00057 deg/Nm`.
@@ -350,6 +351,8 @@ fn is_beyond(stated_m: f64, seen_m: f64, freedom: f64) -> bool {
 struct Found {
     values: DVector<f64>,
     std: DVector<f64>,
+    /// `g² / (M + σ²Π)` of each, square metres.
+    fall_alone_m2: DVector<f64>,
     /// `gᵀ (M + σ²Π)⁻¹ g`, square metres.
     fall_m2: f64,
     /// `σ²`, square metres.
@@ -375,7 +378,17 @@ impl Found {
             DMatrix::from_fn(scale.len(), told.len(), |i, k| scale[i] * eigen.eigenvectors[(i, k)] / (1.0 + told[k]).sqrt());
         let shrunk = along.zip_map(&told, |along, told| along / (1.0 + told).sqrt());
         let std = DVector::from_iterator(scale.len(), root.row_iter().map(|row| variance.sqrt() * row.norm()));
-        Self { values: &root * &shrunk, std, fall_m2: shrunk.norm_squared(), variance, freedom: weights.sum(), weights }
+        let fall_alone_m2 =
+            DVector::from_fn(scale.len(), |i, _| (scale[i] * pull[i]).powi(2) / (scale[i].powi(2) * left[(i, i)].max(0.0) + 1.0));
+        Self {
+            values: &root * &shrunk,
+            std,
+            fall_alone_m2,
+            fall_m2: shrunk.norm_squared(),
+            variance,
+            freedom: weights.sum(),
+            weights,
+        }
     }
 
     fn score(&self, kind: Kind, unknowns: &[Unknown], noise: Noise) -> UnknownScore {
@@ -387,12 +400,12 @@ impl Found {
                 ln_f_tail(self.fall_m2 / self.variance / self.freedom, freedom, (all - self.freedom).max(1.0))
             }
         };
-        let found = unknowns.iter().zip(self.values.iter().zip(self.std.iter()));
-        let estimates = found.map(|(unknown, (&value, &std))| ScoreEstimate {
+        let estimates = unknowns.iter().enumerate().map(|(i, unknown)| ScoreEstimate {
             name: unknown.name.clone(),
             unit: unknown.unit,
-            value: unknown.start + value,
-            std,
+            value: unknown.start + self.values[i],
+            std: self.std[i],
+            fall_alone: self.fall_alone_m2[i] / self.variance,
         });
         UnknownScore {
             kind,
