@@ -17,5 +17,6 @@ mod ranks;
 mod real_data;
 mod report_proofs;
 mod robots;
+mod scores;
 mod stored;
 mod unknowns;

@@ -80,8 +80,8 @@ proptest! {
         let mut values = robot.chain.parameters().to_vec();
         let (of_chain, joints) = (values.len(), robot.chain.joints());
         let discs = robot.chain.joint_kinds().iter().filter(|kind| **kind == JointKind::Revolute).count();
-        // Of a rig: two chucks and three spheres; two rods; two sets; of each joint a compliance and a backlash, of each disc four.
-        prop_assert_eq!(unknowns.list().len(), of_chain + 1 + 2 + 1 + 1 + 15 + 2 + 2 * joints + 4 * discs);
+        // Of a rig: two chucks and three spheres; two rods; two sets; a drift; of each joint a compliance and a backlash, of each disc four.
+        prop_assert_eq!(unknowns.list().len(), of_chain + 1 + 2 + 1 + 1 + 15 + 2 + 1 + 2 * joints + 4 * discs);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         values.iter_mut().for_each(|value| *value += rng.random_range(-0.01..0.01));
         values.extend((of_chain..unknowns.list().len()).map(|_| rng.random_range(-0.003..0.003)));
@@ -132,6 +132,8 @@ fn each_kind_asks_for_what_it_is_made_of() {
     assert_eq!(refused(Kind::Rig, &puma.rig), Some(UnknownError::NoTolerance));
     assert_eq!(refused(Kind::Latency, &puma.rig), Some(UnknownError::NoMotion));
     assert_eq!(refused(Kind::Sets, &puma.rig), Some(UnknownError::NoSets));
+    // These rows are not numbered.
+    assert_eq!(refused(Kind::Drift, &puma.rig), Some(UnknownError::NoOrder));
     assert_eq!(refused(Kind::Compliance, &puma.rig), Some(UnknownError::NoMasses));
     assert_eq!(refused(Kind::Backlash, &puma.rig), Some(UnknownError::NoApproach));
     assert_eq!(refused(Kind::BarZero, &puma.rig), None);
@@ -212,6 +214,33 @@ fn a_zero_that_is_off_is_found_within_its_deviation() {
     // χ² of eight degrees of freedom is within these nine times in ten thousand misses.
     assert!((0.25..1.9).contains(&ratio), "{ratio}");
     assert!(tool_m[0] < 1.5 * tool_m[1], "{tool_m:?}");
+}
+
+/// A zero that creeps by 0.3 mm: the drift is found, and with it the tool.
+#[test]
+fn a_drift_is_found_by_order_as_by_time() {
+    const OFF_M: f64 = 0.3e-3;
+    let puma = Puma::default();
+    let clean = puma.shells(0.46, 30, 0.05e-3, 7);
+    let rows = clean.rows.iter().enumerate().map(|(i, row)| {
+        let mut row = row.clone();
+        row.measurement.length_m += OFF_M * (i as f64 / (clean.rows.len() - 1) as f64 - 0.5);
+        row
+    });
+    let by_order = Dataset::new("drifting", rows.collect()).unwrap();
+    let mut by_time = by_order.clone();
+    for (i, row) in by_time.rows.iter_mut().enumerate() {
+        row.t_s = Some(1e9 + 20.0 * i as f64);
+    }
+    for dataset in [by_order, by_time] {
+        let unknowns = vec![Kind::Drift.block(&puma.design, &puma.rig, &dataset).unwrap()];
+        let found = fit(&puma.design, &dataset, &FitOptions { unknowns, ..FitOptions::default() }).unwrap();
+        let drift = found.parameters.last().unwrap();
+        let off = (drift.fitted - OFF_M) / drift.std.unwrap();
+        assert!(off.abs() < 4.0 && drift.std.unwrap() < 0.05e-3, "{} ± {:?}", drift.fitted, drift.std);
+        let plain = fit(&puma.design, &dataset, &FitOptions::default()).unwrap();
+        assert!(found.fitted.rms_m < 0.055e-3 && found.fitted.rms_m < plain.fitted.rms_m);
+    }
 }
 
 /// A rig whose chucks are moved by their tolerance: the triangle's sides come back, and the fitted rig is what lengths fit to.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ballbar::Damping;
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
-use ballbar_calib::identify::{FitOptions, fit};
+use ballbar_calib::identify::FitOptions;
 use ballbar_calib::model::{Dataset, Rig};
 use ballbar_calib::unknowns::Kind;
 use clap::{Args, ValueEnum};
@@ -17,10 +17,9 @@ use super::hold::parse_hold;
 use super::inputs::{ForceArgs, Measured, MeasuredArgs, OutputArgs, check_max_rms_mm};
 use super::outcome::{CommandError, Outcome};
 use super::report::{Report, largest_text, print, write_calibrated, write_file};
-use super::unknowns::{RigIsKnown, UnknownArgs};
+use super::unknowns::{RigIsKnown, UnknownArgs, unknowns_text};
 use crate::documents::{FitDocument, Fitted, HeldOutRows, ParameterLine};
 use crate::files::{FileKind, Output, Source, fitted_rig_toml, rig_source};
-use crate::remedies::Remedied;
 use crate::terminal::table::{Columns, fixed};
 use crate::text::one_line;
 use crate::units::m_from_mm;
@@ -96,14 +95,14 @@ impl FitArgs {
             DampingArg::Diagonal => Damping::Diagonal,
         };
         check_max_rms_mm(self.max_rms_mm)?;
-        if self.out_rig.is_some() && !self.unknowns.has(Kind::Rig) {
+        if self.out_rig.is_some() && !self.unknowns.may_have(Kind::Rig) {
             return Err(RigIsKnown.into());
         }
         let measured = self.measured.read()?;
         let Measured { robot, rig, dataset, .. } = &measured;
-        let unknowns = self.unknowns.blocks(robot, rig, dataset)?;
         let (prior, loss) = (self.beliefs.prior(), self.beliefs.loss());
-        let fit = fit(robot, dataset, &FitOptions { hold, prior, loss, damping, unknowns }).map_err(Remedied)?;
+        let options = FitOptions { hold, prior, loss, damping, ..FitOptions::default() };
+        let (fit, unknowns) = self.unknowns.fit(robot, rig, dataset, &options)?;
         let unseen: Vec<(String, &Dataset)> = measured.unseen().into_iter().collect();
         let evidence = Evidence { robot, rig, dataset, fit: &fit, unseen: &unseen, max_rms_m: self.max_rms_mm.map(m_from_mm) };
         let assessment = Assessment::new(&evidence);
@@ -117,6 +116,7 @@ impl FitArgs {
             warnings: &measured.warnings,
             fit: &fit,
             assessment: &assessment,
+            unknowns: &unknowns,
         };
         let mut report = FitReport { document: FitDocument::new(&fitted), out_rig: None, asked_out: None };
         if let Some(path) = &self.out {
@@ -142,6 +142,7 @@ impl Report for FitReport {
         for remark in &document.remarks {
             text += &format!("\n{remark}\n");
         }
+        text += &unknowns_text(&document.unknowns);
         text += "\n";
         let mut table = Columns::new(&["<parameter", "<unit", "initial", "final", "change", "std. dev.", "<"]);
         for parameter in &document.parameters {

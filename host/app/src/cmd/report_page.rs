@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
-use ballbar_calib::identify::{FitOptions, fit, remarks};
+use ballbar_calib::identify::{FitOptions, remarks};
 use ballbar_calib::model::Dataset;
 use clap::Args;
 use miette::Diagnostic;
@@ -17,7 +17,6 @@ use super::outcome::{CommandError, Outcome};
 use super::report::{Report, print, write_files};
 use super::unknowns::UnknownArgs;
 use crate::files::{FileKind, Output, read_poses};
-use crate::remedies::Remedied;
 use crate::report::{Facts, Figure, Inputs, figures, html, parameters_table};
 use crate::session::poses_of;
 use crate::text::one_line;
@@ -117,10 +116,9 @@ impl ReportArgs {
         let others = self.others(&measured)?;
         let page = Output { path: &self.out, kind: FileKind::Page, force: self.replace.force };
         page.check().map_err(CommandError::not_written)?;
-        let unknowns = self.unknowns.blocks(&measured.robot, &measured.rig, &measured.dataset)?;
         let (prior, loss) = (self.beliefs.prior(), self.beliefs.loss());
-        let options = FitOptions { hold, prior, loss, unknowns, ..FitOptions::default() };
-        let fit = fit(&measured.robot, &measured.dataset, &options).map_err(Remedied)?;
+        let options = FitOptions { hold, prior, loss, ..FitOptions::default() };
+        let (fit, _) = self.unknowns.fit(&measured.robot, &measured.rig, &measured.dataset, &options)?;
 
         let remarks = remarks(&measured.robot.chain, &measured.dataset, &measured.rig, &measured.robot.limits);
         let unseen: Vec<(String, &Dataset)> =

@@ -9,6 +9,7 @@ use ballbar_calib::model::{Dataset, Rig, Robot};
 use serde::Serialize;
 
 use super::lines::{HeldOutRows, NotIdentified, PairingLine, ResidualLine, largest};
+use super::unknowns::UnknownsDocument;
 use crate::units::{ScreenUnit, mm_from_m};
 
 /// A fit, in the units of the screen.
@@ -72,6 +73,8 @@ pub struct FitDocument {
     pub prior: Option<PriorLine>,
     /// The largest residuals.
     pub largest: Vec<ResidualLine>,
+    /// Kinds of unknowns that were taken in, and that would explain what is left.
+    pub unknowns: UnknownsDocument,
     /// What to know of the poses, a sentence each.
     pub remarks: Vec<String>,
     /// Rows that may be mistakes, a sentence each.
@@ -191,12 +194,14 @@ pub struct Fitted<'a> {
     pub fit: &'a Fit,
     /// What is thought of it.
     pub assessment: &'a Assessment,
+    /// What else may be unknown.
+    pub unknowns: &'a UnknownsDocument,
 }
 
 impl FitDocument {
     /// Of a fit that was not written.
     pub fn new(fitted: &Fitted<'_>) -> Self {
-        let Fitted { robot, rig, dataset, held_out, warnings, fit, assessment } = *fitted;
+        let Fitted { robot, rig, dataset, held_out, warnings, fit, assessment, unknowns } = *fitted;
         let held_out_rows = held_out.map(|(rule, rows)| HeldOutRows::new(rule, rows, robot, fit));
         let test = match fit.solution.status {
             Status::Converged(ConvergenceTest::Gradient) => Some("gradient"),
@@ -237,6 +242,7 @@ impl FitDocument {
                 released: prior.released.iter().map(|released| released.part.to_string()).collect(),
             }),
             largest: largest(dataset, rig, &fit.residuals, 5),
+            unknowns: unknowns.clone(),
             remarks: remarks(&robot.chain, dataset, rig, &robot.limits)
                 .into_iter()
                 .chain(fit.remarks().iter().map(|remark| remark_text(remark, dataset)))

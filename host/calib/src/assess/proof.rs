@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::evidence::Evidence;
-use crate::identify::{Residual, ResidualSummary, postures, residuals};
+use crate::identify::{FEWEST_POSTURES, Residual, ResidualSummary, mean_and_error, postures, residuals};
 use crate::model::{Dataset, PoseRow};
 
 /// What keeps lengths apart from the fit.
@@ -34,9 +34,6 @@ pub struct Proof {
     pub postures: Vec<usize>,
 }
 
-/// Fewer postures tell neither a standard error nor which of two models is better.
-const FEWEST: usize = 8;
-
 impl Proof {
     /// Size of the residuals with the design.
     pub fn before_summary(&self) -> ResidualSummary {
@@ -55,37 +52,21 @@ impl Proof {
 
     /// Standard error of the RMS with the fit, metres, by how it differs from posture to posture; `None` for too few.
     pub fn rms_error_m(&self) -> Option<f64> {
-        let (_, error) = self.mean_and_error(|row| self.after[row].weight * self.after[row].value_m.powi(2))?;
+        let (_, error) = mean_and_error(&self.postures, |row| self.after[row].weight * self.after[row].value_m.powi(2))?;
         let rms_m = self.after_summary().rms_m;
         (rms_m > 0.0).then(|| error / (2.0 * rms_m))
     }
 
     /// Whether the fit predicts these lengths worse than the design does, and they are enough to say so.
     pub fn speaks_against(&self) -> bool {
-        self.posture_count() >= FEWEST && self.after_summary().rms_m > self.before_summary().rms_m
+        self.posture_count() >= FEWEST_POSTURES && self.after_summary().rms_m > self.before_summary().rms_m
     }
 
     /// Whether the fit predicts these lengths better than the design by more than twice what chance would do to the difference.
     pub fn speaks_for(&self) -> bool {
         let square = |residual: &Residual| residual.weight * residual.value_m.powi(2);
-        let gain = self.mean_and_error(|row| square(&self.before[row]) - square(&self.after[row]));
+        let gain = mean_and_error(&self.postures, |row| square(&self.before[row]) - square(&self.after[row]));
         gain.is_some_and(|(mean, error)| mean > 2.0 * error)
-    }
-
-    /// Mean of a value over the rows and its standard error, rows of one posture taken together; `None` for too few postures.
-    fn mean_and_error(&self, value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
-        let (rows, count) = (self.postures.len() as f64, self.posture_count());
-        if count < FEWEST {
-            return None;
-        }
-        let mean = (0..self.postures.len()).map(&value).sum::<f64>() / rows;
-        let mut off = vec![0.0; count];
-        for (row, &posture) in self.postures.iter().enumerate() {
-            off[posture] += value(row) - mean;
-        }
-        let count = count as f64;
-        let squares: f64 = off.iter().map(|off| off * off).sum();
-        Some((mean, (count / (count - 1.0) * squares).sqrt() / rows))
     }
 }
 

@@ -227,7 +227,7 @@ fn weak_columns(unknowns: &[Unknown], jacobian: &DMatrix<f64>, independent: &[us
 }
 
 /// Which columns of the subset make up another column, strongest first.
-fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<usize> {
+pub(super) fn mimics(jacobian: &DMatrix<f64>, subset: &[usize], index: usize) -> Vec<usize> {
     let columns = jacobian.select_columns(subset);
     let target = jacobian.column(index).into_owned();
     let qr = columns.clone().qr();

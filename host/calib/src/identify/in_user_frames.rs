@@ -22,7 +22,15 @@ pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unkno
     let fitted = frames.in_user_frames(&fit.solution.chain);
     let of_chain = unknowns.of_chain().len();
     let mut solution = fit.solution;
-    let user_by_free = user_by_free(&frames.user_by_canonical(&solution.chain), &fit.parameters);
+    let found_again = |index: usize| index < of_chain && fitted.parameters()[index] != unknowns.list()[index].start;
+    let mut user_by_free = user_by_free(&frames.user_by_canonical(&solution.chain), &fit.parameters);
+    // A zero that was lost is found as the same offset in all frames, and nothing else moves with it.
+    let free = (0..fit.parameters.len()).filter(|&index| fit.parameters[index].held.is_none());
+    let lost = free.enumerate().filter(|&(_, index)| found_again(index) && is_offset(index)).collect::<Vec<_>>();
+    for (column, index) in lost {
+        user_by_free.column_mut(column).fill(0.0);
+        user_by_free[(index, column)] = 1.0;
+    }
     solution.values[..of_chain].copy_from_slice(fitted.parameters());
     solution.chain = fitted;
 
@@ -38,12 +46,7 @@ pub(super) fn in_user_frames(fit: Fit, frames: &CanonicalFrames, unknowns: Unkno
         initial: unknown.start,
         fitted: value,
         std: std_of(index),
-        held: if moves[index] || value != unknown.start {
-            // A zero that was lost has changed, though nothing in these frames moves it.
-            None
-        } else {
-            Some(reason(index, canonical, &found.findings[index]))
-        },
+        held: if moves[index] { None } else { Some(reason(index, canonical, &found.findings[index])) },
     });
     let parameters: Vec<FittedParameter> = parameters.collect();
     let mut identifiability = fit.identifiability;
@@ -66,6 +69,10 @@ impl Fit {
         let terms = CanonicalFrames::new(&robot.chain).terms_in_user_frames(&chain, &self.terms(robot));
         Robot { chain, terms, ..robot.clone() }
     }
+}
+
+fn is_offset(index: usize) -> bool {
+    Parameter::from_index(index).kind() == ParameterKind::Offset
 }
 
 /// Why a parameter stays that nothing moves: in these frames' own names, or, where they do not tell, as in canonical ones, or because it turns

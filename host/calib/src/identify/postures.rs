@@ -36,6 +36,27 @@ pub fn postures<'a>(kinds: &[JointKind], rows: impl IntoIterator<Item = &'a Join
         .collect()
 }
 
+/// Fewer postures tell neither a standard error nor which of two models is better.
+pub(crate) const FEWEST_POSTURES: usize = 8;
+
+/// Mean of a value over the rows, whose postures these are, and its standard error, rows of one posture taken together; `None` for too few
+/// postures.
+pub(crate) fn mean_and_error(postures: &[usize], value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
+    let rows = postures.len() as f64;
+    let count = postures.iter().max().map_or(0, |last| last + 1);
+    if count < FEWEST_POSTURES {
+        return None;
+    }
+    let mean = (0..postures.len()).map(&value).sum::<f64>() / rows;
+    let mut off = vec![0.0; count];
+    for (row, &posture) in postures.iter().enumerate() {
+        off[posture] += value(row) - mean;
+    }
+    let count = count as f64;
+    let squares: f64 = off.iter().map(|off| off * off).sum();
+    Some((mean, (count / (count - 1.0) * squares).sqrt() / rows))
+}
+
 /// How many steps of `same` a joint's values go over.
 fn spread(rows: &[&[f64]], joint: usize, same: f64) -> f64 {
     let values = rows.iter().map(|row| row[joint]);

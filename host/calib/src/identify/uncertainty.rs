@@ -13,6 +13,9 @@ pub struct Uncertainty {
     pub std: Vec<Option<f64>>,
     /// Standard deviation of a length of weight 1 as the residuals show it, `√(Σ w f² / freedom)`, metres; `None` without redundancy.
     pub sigma_m: Option<f64>,
+    /// Standard deviation of a length of weight 1 that deviations are made of, metres: what is stated, where beliefs count beside lengths that
+    /// deviate no more, else what is seen.
+    pub noise_m: Option<f64>,
     /// How many unknowns the lengths have decided: all that are free (or the rank of their columns) but for what beliefs had decided before.
     pub told: f64,
     /// Lengths less those: degrees of freedom that are left to the residuals.
@@ -59,6 +62,6 @@ impl Uncertainty {
         let null = spectrum.right.columns(spectrum.rank, free.len() - spectrum.rank);
         let is_told = |i: usize| null.row(i).norm_squared() < NULL_SHARE && noise_m.is_some();
         let std = (0..free.len()).map(|i| is_told(i).then(|| covariance[(i, i)].sqrt())).collect();
-        Self { std, sigma_m, told, freedom, spectrum, covariance }
+        Self { std, sigma_m, noise_m, told, freedom, spectrum, covariance }
     }
 }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::{BarZero, Block, Gain, Latency, RigBlock, RodZeros, SetOffsets, TermsBlock};
+use super::{BarZero, Block, Drift, Gain, Latency, RigBlock, RodZeros, SetOffsets, TermsBlock};
 use crate::model::{Dataset, Rig, Robot};
 
 /// A kind of unknowns that a fit may be asked for.
@@ -21,6 +21,8 @@ pub enum Kind {
     Rig,
     /// By how much the lengths of each set are too long.
     Sets,
+    /// By how much lengths grow too long from the first to the last.
+    Drift,
     /// How far joints yield to gravity.
     Compliance,
     /// How far encoders' discs are off their axes.
@@ -31,20 +33,21 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::BarZero,
         Self::RodZeros,
         Self::BarGain,
         Self::Latency,
         Self::Rig,
         Self::Sets,
+        Self::Drift,
         Self::Compliance,
         Self::Eccentricity,
         Self::Backlash,
     ];
 
-    /// What it is called: `bar-zero`, `rod-zeros`, `bar-gain`, `latency`, `rig`, `sets`, `compliance`,
-    /// `eccentricity`, `backlash`.
+    /// What it is called: `bar-zero`, `rod-zeros`, `bar-gain`, `latency`, `rig`, `sets`, `drift`,
+    /// `compliance`, `eccentricity`, `backlash`.
     pub fn name(self) -> &'static str {
         match self {
             Self::BarZero => "bar-zero",
@@ -53,6 +56,7 @@ impl Kind {
             Self::Latency => "latency",
             Self::Rig => "rig",
             Self::Sets => "sets",
+            Self::Drift => "drift",
             Self::Compliance => "compliance",
             Self::Eccentricity => "eccentricity",
             Self::Backlash => "backlash",
@@ -76,6 +80,7 @@ impl Kind {
             Self::Latency => AnyBlock::Latency(Latency::new(dataset)?),
             Self::Rig => AnyBlock::Rig(RigBlock::new(rig, dataset)?),
             Self::Sets => AnyBlock::Sets(SetOffsets::new(dataset)?),
+            Self::Drift => AnyBlock::Drift(Drift::new(dataset)?),
             Self::Compliance => AnyBlock::Terms(Box::new(TermsBlock::compliance(robot)?)),
             Self::Eccentricity => AnyBlock::Terms(Box::new(TermsBlock::eccentricity(robot)?)),
             Self::Backlash => AnyBlock::Terms(Box::new(TermsBlock::backlash(robot, dataset)?)),
@@ -99,11 +104,27 @@ pub enum AnyBlock {
     Rig(RigBlock),
     /// [`Kind::Sets`].
     Sets(SetOffsets),
+    /// [`Kind::Drift`].
+    Drift(Drift),
     /// [`Kind::Compliance`], [`Kind::Eccentricity`] or [`Kind::Backlash`].
     Terms(Box<TermsBlock>),
 }
 
 impl AnyBlock {
+    /// Of which kind the unknowns are.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::BarZero(_) => Kind::BarZero,
+            Self::RodZeros(_) => Kind::RodZeros,
+            Self::Gain(_) => Kind::BarGain,
+            Self::Latency(_) => Kind::Latency,
+            Self::Rig(_) => Kind::Rig,
+            Self::Sets(_) => Kind::Sets,
+            Self::Drift(_) => Kind::Drift,
+            Self::Terms(block) => block.kind(),
+        }
+    }
+
     pub(super) fn as_block(&self) -> &dyn Block {
         match self {
             Self::BarZero(block) => block,
@@ -112,6 +133,7 @@ impl AnyBlock {
             Self::Latency(block) => block,
             Self::Rig(block) => block,
             Self::Sets(block) => block,
+            Self::Drift(block) => block,
             Self::Terms(block) => block.as_ref(),
         }
     }
@@ -136,6 +158,9 @@ pub enum UnknownError {
     /// No row belongs to a set.
     #[error("no row names a set")]
     NoSets,
+    /// Nothing tells the first row from the last.
+    #[error("neither times nor numbers of the rows tell the first from the last")]
+    NoOrder,
     /// No joint bears a mass.
     #[error("no mass is known that a joint bears")]
     NoMasses,

@@ -12,6 +12,7 @@
 
 mod bar;
 mod chain;
+mod drift;
 mod list;
 mod rig;
 mod sets;
@@ -21,6 +22,7 @@ use ballbar::{Chain, JointTerms, Kinematics, LANES, Lanes, LengthRows, Measureme
 
 pub use bar::{BarZero, Gain, Latency, RodZeros};
 pub use chain::{ChainBlock, plausible_error};
+pub use drift::Drift;
 pub use list::{AnyBlock, Kind, UnknownError};
 pub use rig::RigBlock;
 pub use sets::SetOffsets;
@@ -82,6 +84,29 @@ impl Unknowns {
         let sizes = of_others.iter().map(Vec::len).collect();
         let list = chain.unknowns().into_iter().chain(of_others.into_iter().flatten()).collect();
         Self { chain, others, sizes, list }
+    }
+
+    /// The same and the unknowns of more blocks, behind all others.
+    #[must_use]
+    pub fn with(&self, more: impl IntoIterator<Item = AnyBlock>) -> Self {
+        let mut with = self.clone();
+        for block in more {
+            let of_block = block.as_block().unknowns();
+            with.sizes.push(of_block.len());
+            with.list.extend(of_block);
+            with.others.push(block);
+        }
+        with
+    }
+
+    /// The kinds of the other blocks, in their order.
+    pub fn kinds(&self) -> Vec<Kind> {
+        self.others.iter().map(AnyBlock::kind).collect()
+    }
+
+    /// How many unknowns each of the other blocks has.
+    pub(crate) fn sizes(&self) -> &[usize] {
+        &self.sizes
     }
 
     /// The unknowns, the chain's first, in parameter order.

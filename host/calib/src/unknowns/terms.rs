@@ -3,7 +3,7 @@
 use ballbar::{JointKind, JointTerms, JointVector, Lanes, LengthRows, Measurement, ParameterUnit, TermKind, term_basis};
 
 use super::chain::plausible_error;
-use super::{Block, ChainBlock, Unknown, UnknownError};
+use super::{Block, ChainBlock, Kind, Unknown, UnknownError};
 use crate::model::{Dataset, PoseRow, Robot};
 
 /// Some terms of some joints, as changes of those that the robot has. The loads that compliance yields to are those of the design: they
@@ -59,6 +59,15 @@ impl TermsBlock {
             joints.flat_map(|joint| kinds.iter().map(move |&kind| Term { joint, kind: kind as usize })).collect();
         let design = ChainBlock::new(robot.chain.clone(), robot.terms);
         (!terms.is_empty()).then_some(Self { design, terms })
+    }
+
+    /// All terms of a block are of one kind.
+    pub(super) fn kind(&self) -> Kind {
+        match self.terms.first().map(|term| TermKind::ALL[term.kind]) {
+            Some(TermKind::Compliance) => Kind::Compliance,
+            Some(TermKind::Backlash) => Kind::Backlash,
+            _ => Kind::Eccentricity,
+        }
     }
 
     /// `φ` of each term where a row was measured.
