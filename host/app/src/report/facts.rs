@@ -29,9 +29,11 @@ pub struct Inputs<'a> {
     pub remarks: &'a [String],
 }
 
-/// One fitted pose.
+/// One pose.
 #[derive(Clone, Debug)]
 pub struct RowFact {
+    /// Where it lies in the order of measurement ([`ballbar_calib::assess::Order::places`]).
+    pub order: f64,
     /// Number over all files, from 1.
     pub number: usize,
     /// File and line.
@@ -108,6 +110,8 @@ pub struct Facts {
     pub pairings: Vec<(String, usize)>,
     /// The fitted poses, in the order of measurement.
     pub rows: Vec<RowFact>,
+    /// The poses that were left out because they contradict the others, each with its likely cause.
+    pub left_out: Vec<(RowFact, String)>,
     /// Where they lie, as far as their lengths are alike.
     pub shells: Vec<Shell>,
     /// Residuals of the fitted poses with the design.
@@ -152,7 +156,11 @@ impl Facts {
         let Inputs { robot, rig, dataset, fit, .. } = inputs;
         let pairings = dataset.pairings();
         let before = residuals(&robot.kinematics(), dataset);
-        let rows = rows(inputs, &pairings, &before);
+        let all = rows(inputs, &pairings, &before);
+        let (rows, left_out) = divided(inputs, all);
+        // From rows of the dataset to those that were fitted.
+        let is_before = |row: usize| fit.wrong_rows.iter().filter(|wrong| wrong.row < row).count();
+        let outliers = fit.outliers.iter().map(|outlier| Outlier { row: outlier.row - is_before(outlier.row), ..*outlier });
         Self {
             robot: robot.name.clone(),
             robot_file: robot.source.as_str().to_owned(),
@@ -177,11 +185,12 @@ impl Facts {
             told: fit.uncertainty.spectrum.rank,
             sigma_m: fit.uncertainty.sigma_m,
             neighbour_correlation: fit.neighbour_correlation,
-            outliers: fit.outliers.clone(),
+            outliers: outliers.collect(),
             correlation: correlation(fit),
             workspace: Workspace::new(robot, fit),
             remarks: inputs.remarks.to_vec(),
             shells: shells(&rows, &pairings),
+            left_out,
             rows,
         }
     }
@@ -198,12 +207,13 @@ impl Facts {
 }
 
 fn rows(inputs: &Inputs<'_>, pairings: &[PairingId], before: &[Residual]) -> Vec<RowFact> {
-    let Inputs { robot, dataset, fit, .. } = inputs;
+    let Inputs { robot, dataset, fit, assessment, .. } = inputs;
     let kinematics = Kinematics::new(&fit.solution.chain);
     let fact = |(i, row): (usize, &PoseRow)| {
         let sphere_m = kinematics.point_in_base(&row.measurement.q, &row.measurement.pairing.sphere_tool_m);
         let bar_m = sphere_m - row.measurement.pairing.chuck_base_m;
         RowFact {
+            order: assessment.order.places[i],
             number: row.number,
             place: dataset.place(i),
             pairing: pairings.iter().position(|&id| id == row.pairing).unwrap_or_default(),
@@ -221,6 +231,21 @@ fn rows(inputs: &Inputs<'_>, pairings: &[PairingId], before: &[Residual]) -> Vec
         }
     };
     dataset.rows.iter().enumerate().map(fact).collect()
+}
+
+/// Those that were fitted, and those that were not, with what is thought of them.
+fn divided(inputs: &Inputs<'_>, rows: Vec<RowFact>) -> (Vec<RowFact>, Vec<(RowFact, String)>) {
+    let Inputs { fit, assessment, .. } = inputs;
+    let (mut fitted, mut left_out) = (Vec::new(), Vec::new());
+    for (i, row) in rows.into_iter().enumerate() {
+        if fit.wrong_rows.iter().any(|wrong| wrong.row == i) {
+            let cause = assessment.causes.iter().find(|cause| cause.rows.contains(&i));
+            left_out.push((row, cause.map(ToString::to_string).unwrap_or_default()));
+        } else {
+            fitted.push(row);
+        }
+    }
+    (fitted, left_out)
 }
 
 /// One shell a chuck and bar, where the lengths differ by no more than a bar travels.

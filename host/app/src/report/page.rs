@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::facts::{Facts, RowFact};
 use super::figures::{CHUCKS, Figure, dark_rules, drawn, hex, wires_m};
-use super::tables::{largest, parameters};
+use super::tables::{largest, left_out, parameters};
 use crate::text::visible;
 use crate::units::{fixed, mm_from_m};
 
@@ -33,6 +33,7 @@ pub fn html(facts: &Facts, figures: &[Figure], when: &str) -> String {
                 (first_screen(facts, when))
                 main {
                     @for figure in figures { (figure_markup(figure, facts)) }
+                    @if let Some(wrong) = left_out(facts) { (wrong) }
                     (largest(facts))
                     (parameters(facts))
                 }
@@ -127,6 +128,10 @@ fn grounds(facts: &Facts) -> Vec<Markup> {
     if let Some(sigma_m) = facts.sigma_m {
         let sigma = fixed(mm_from_m(sigma_m), 3);
         grounds.push(html! { "One length scatters about the fit by " (sigma) " mm (standard deviation)." });
+    }
+    if !facts.left_out.is_empty() {
+        let (wrong, all) = (facts.left_out.len(), facts.left_out.len() + facts.rows.len());
+        grounds.push(html! { (wrong) " of " (all) " lengths contradict the others and were left out; they are listed below." });
     }
     if facts.outliers.is_empty() {
         grounds.push(html! { "No length stands out from the others." });

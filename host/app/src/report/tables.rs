@@ -11,6 +11,31 @@ const LARGEST: usize = 12;
 /// Rows that stand out and are listed; of more, the worst.
 const MOST_OUTLIERS: usize = 50;
 
+/// Rows that were left out, with their likely cause; nothing where there are none.
+pub(super) fn left_out(facts: &Facts) -> Option<Markup> {
+    let shown = facts.left_out.iter().take(MOST_OUTLIERS);
+    (!facts.left_out.is_empty()).then(|| html! {
+        section #left-out .wide {
+            h2 { "Lengths left out" }
+            p {
+                "They contradict the others, by far more than chance gives, and were not fitted; no figure shows them. Look at what made them "
+                "wrong, and measure them again."
+                @if facts.left_out.len() > MOST_OUTLIERS { " The first " (MOST_OUTLIERS) " of " (facts.left_out.len()) ":" }
+            }
+            div.scroll tabindex="0" { table {
+                thead { tr { th { "at" } th { "pairing" } th.number { "off by, mm" } th { "likely cause" } th { "joints" } } }
+                tbody { @for (row, cause) in shown { tr {
+                    td { (row.place) }
+                    td { (facts.pairings.get(row.pairing).map_or("", |pairing| &pairing.0)) }
+                    td.number { (fixed(mm_from_m(row.after_m), 3)) }
+                    td { (cause) }
+                    td { (joints_text(&facts.joints, &row.q)) }
+                } } }
+            } }
+        }
+    })
+}
+
 /// All rows that stand out, then the largest of the others.
 pub(super) fn largest(facts: &Facts) -> Markup {
     let outliers: Vec<usize> = facts.outliers.iter().map(|outlier| outlier.row).take(MOST_OUTLIERS).collect();

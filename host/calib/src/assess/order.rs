@@ -28,10 +28,10 @@ impl Order {
     }
 }
 
-/// Residuals with the fit by pairing, in the order of `Dataset::pairings`, each with its place in the order of measurement.
+/// Residuals of the fitted rows by pairing, in the order of `Dataset::pairings`, each with its place in the order of measurement.
 pub(super) fn by_pairing(evidence: &Evidence<'_>, order: &Order) -> Vec<Vec<(f64, Residual)>> {
-    let of_pairing =
-        |pairing| evidence.dataset.rows_of(pairing).map(|row| (order.places[row], evidence.fit.residuals[row])).collect();
+    let placed = |row: usize| (order.places[row], evidence.fit.residuals[row]);
+    let of_pairing = |pairing| evidence.dataset.rows_of(pairing).map(placed).filter(|(_, f)| f.weight > 0.0).collect();
     evidence.dataset.pairings().into_iter().map(of_pairing).collect()
 }
 

@@ -98,11 +98,19 @@ pub(super) fn proofs(evidence: &Evidence<'_>, before: Vec<Residual>) -> Vec<Proo
             if proof.in_blocks { ", each measured in one go" } else { "" }
         ),
         kind: ProofKind::LeftOut,
-        before,
-        after: fit.left_out.clone(),
-        postures: postures(kinds, dataset.rows.iter().map(|row| &row.measurement.q)),
+        before: fitted(&before),
+        after: fitted(&fit.left_out),
+        postures: postures(
+            kinds,
+            dataset.rows.iter().zip(&before).filter(|(_, f)| f.weight > 0.0).map(|(row, _)| &row.measurement.q),
+        ),
     });
     apart.into_iter().chain(left_out).chain(same).collect()
+}
+
+/// Without rows that were left out as wrong.
+fn fitted(residuals: &[Residual]) -> Vec<Residual> {
+    residuals.iter().copied().filter(|residual| residual.weight > 0.0).collect()
 }
 
 /// Numbers of the rows in whose posture a length was fitted.

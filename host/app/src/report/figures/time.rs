@@ -16,8 +16,7 @@ const SMALLEST_WINDOW: usize = 3;
 
 pub(super) fn figure(facts: &Facts) -> Result<Figure, FigureError> {
     let order = &facts.assessment.order;
-    let residuals_mm = facts.rows.iter().map(|row| mm_from_m(row.after_m));
-    let points: Vec<(f64, f64)> = order.places.iter().copied().zip(residuals_mm).collect();
+    let points: Vec<(f64, f64)> = facts.rows.iter().map(|row| (row.order, mm_from_m(row.after_m))).collect();
     let mean = |window: &[(f64, f64)]| {
         let n = window.len() as f64;
         (window.iter().map(|point| point.0).sum::<f64>() / n, window.iter().map(|point| point.1).sum::<f64>() / n)
