@@ -104,20 +104,22 @@ fn simulate_writes_the_same_poses_to_a_file_as_to_stdout_and_the_same_for_the_sa
 #[test]
 fn fit_shows_what_it_found_for_each_rule_of_holding() {
     let folder = puma();
-    let auto = shows(&folder, "fit", &FIT);
+    shows(&folder, "fit", &FIT);
     shows(&folder, "fit_damped_by_the_diagonal", &[&FIT[..], &["--damping", "diagonal"]].concat());
     shows(&folder, "fit_hold_auto_and_names", &[&FIT[..], &["--hold", "auto,scale3,x7"]].concat());
 
-    let paper = runs(&folder, &[&FIT, &["--hold", "paper"]]);
+    const PLAIN: [&str; 2] = ["--prior", "none"];
+    let auto = shows(&folder, "fit_without_prior", &[&FIT[..], &PLAIN].concat());
+    let paper = runs(&folder, &[&FIT, &PLAIN, &["--hold", "paper"]]);
     // The same parameters by other steps: those of the paper's set are taken in the frames of the file.
     let table = |text: &str| text.split_once("parameter  unit").expect("a table of parameters").1.to_owned();
     assert_eq!(table(&paper.stdout.replace("as in the paper", "redundant")), table(&without_reasons(&auto.stdout)));
     let names = "offset1,z2,alpha2,offset2,z3,alpha3,offset3,z4,alpha4,offset4,z5,alpha5,offset5,z6,alpha6,offset6,z7,alpha7";
-    let named = runs(&folder, &[&FIT, &["--hold", names]]);
+    let named = runs(&folder, &[&FIT, &PLAIN, &["--hold", names]]);
     assert_eq!(named.stdout.replace("by name", "as in the paper"), paper.stdout);
 
     // Redundant parameters share their changes in a way that rounding decides: the headline only.
-    let args = [&FIT[..], &["--hold", "none"]].concat();
+    let args = [&FIT[..], &PLAIN, &["--hold", "none"]].concat();
     let none = runs(&folder, &[&args]);
     snapshot("fit_hold_none", &args, headline(&none));
     assert!(none.stdout.contains("undetermined"));

@@ -29,9 +29,12 @@ fn a_bar_that_the_rig_says_is_exact_is_no_unknown() {
 fn arguments_that_make_no_sense_are_refused() {
     const PUMA: [&str; 4] = ["--robot", "puma560", "--rig", "triangles"];
     let bench = puma_bench();
-    let cases: [(&str, &str, &[&str]); 33] = [
-        ("fit_without_redundancy", "fit", &["one.csv", "--hold", "none", "--out", "old.toml"]),
-        ("fit_of_as_many_poses_as_parameters", "fit", &["one.csv", "--out", "old.toml"]),
+    let cases: [(&str, &str, &[&str]); 36] = [
+        ("fit_without_redundancy", "fit", &["one.csv", "--prior", "none", "--hold", "none", "--out", "old.toml"]),
+        ("fit_of_as_many_poses_as_parameters", "fit", &["one.csv", "--prior", "none", "--out", "old.toml"]),
+        ("exclude_a_row_that_is_not_there", "fit", &["all.csv", "--exclude", "12,1000", "--out", "old.toml"]),
+        ("exclude_no_range", "fit", &["all.csv", "--exclude", "3-1"]),
+        ("exclude_every_row", "report", &["one.csv", "--exclude", "1-36", "--out", "page.html"]),
         ("unknown_of_no_kind", "fit", &["all.csv", "--unknown", "bar_zero"]),
         ("unknown_rig_without_a_tolerance", "fit", &["all.csv", "--unknown", "bar-zero,rig"]),
         ("unknown_latency_of_poses_that_stood", "report", &["all.csv", "--unknown", "latency", "--out", "page.html"]),

@@ -107,6 +107,9 @@ fn fit_documents_outliers_by_row_number_and_why_nothing_was_written() {
     assert_eq!(list(&fit["outliers"]).len(), 0);
     near(&fit["left_out"][0]["residual_mm"], 2.0, 0.5);
     assert!(number(&fit["left_out"][0]["deviations"]) > 10.0);
+    let without = document(&folder, 0, &[&["fit"], &DESIGN, &["poses.csv", "--exclude", "25,100-100"]]);
+    assert_eq!(without["parameters"], fit["parameters"], "as if they had not been measured");
+    assert_eq!(count(&without["poses"]), count(&fit["poses"]) - 2);
     let fit = document(&folder, 0, &[&["fit"], &DESIGN, &["poses.csv", "--loss", "none"]]);
     let outliers: Vec<u64> = list(&fit["outliers"]).iter().map(count).collect();
     assert!(outliers.contains(&25) && outliers.contains(&100), "{outliers:?}");

@@ -222,14 +222,15 @@ fn changes_that_no_robot_has_are_refused_and_those_of_a_base_set_down_elsewhere_
     elsewhere.chain.parameters_mut()[0] += 0.2;
     let near = assess(&elsewhere, &cell.rig, &good, Hold::paper());
     assert_eq!(near.answer, Answer::Reserved, "{:?}", near.reasons);
-    assert!(near.reasons.join(" ").contains("link 1, where the robot stands, by "), "{:?}", near.reasons);
+    assert!(near.reasons.join(" ").to_lowercase().contains("does the robot stand"), "{:?}", near.reasons);
 
     // An arm of another length: the fit finds it, and does not believe it.
     let mut other_arm = cell.design.clone();
     other_arm.chain.parameters_mut()[16] += 0.15;
     let other = assess(&other_arm, &cell.rig, &good, Hold::paper());
     assert_eq!(other.answer, Answer::NotTrusted, "{:?}", other.reasons);
-    assert!(other.reasons.join(" ").contains("no such robot exists"), "{:?}", other.reasons);
+    let said = other.reasons.join(" ");
+    assert!(said.contains("no such robot exists") || said.contains("do not belong together"), "{said}");
 }
 
 #[test]

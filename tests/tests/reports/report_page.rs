@@ -4,7 +4,7 @@ use std::fs;
 
 use ballbar::{FreeParameters, Kinematics};
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
-use ballbar_calib::identify::{Fit, FitOptions, LmOptions, fit, solve_lengths};
+use ballbar_calib::identify::{Fit, FitOptions, LmOptions, Loss, fit, solve_lengths};
 use ballbar_calib::model::Dataset;
 use ballbar_calib::simulate::tool_error;
 use ballbar_tests::command::host_cal_in;
@@ -167,7 +167,9 @@ fn longitude_latitude_and_length_lead_from_the_chuck_to_the_sphere() {
 #[test]
 fn left_out_residuals_are_those_of_a_fit_without_them() {
     let puma = Puma::default();
-    let (facts, dataset, fit) = facts_of(&puma, 84e-6);
+    let dataset = facts_of(&puma, 84e-6).1;
+    let fit = fit(&puma.design, &dataset, &FitOptions::plain()).expect("enough poses");
+    let facts = facts(&puma, &dataset, &fit);
     let proof = facts.assessment.proofs.last().expect("enough poses");
     let folds = fit.cross_validation.expect("enough poses").folds;
     // Every pose is a posture of its own here, so that rows take turns.
@@ -286,7 +288,10 @@ fn correlations_are_one_on_the_diagonal_and_symmetric() {
 fn an_outlier_drift_and_few_parameters_are_reasons_for_reserve() {
     let puma = Puma::default();
     let mut dataset = puma.shells(0.46, 30, 84e-6, 3);
-    let fitted = |dataset: &Dataset| fit(&puma.design, dataset, &FitOptions::default()).expect("enough poses");
+    let fitted = |dataset: &Dataset| {
+        let options = FitOptions { loss: Loss::None, ..FitOptions::default() };
+        fit(&puma.design, dataset, &options).expect("enough poses")
+    };
     assert_eq!(facts(&puma, &dataset, &fitted(&dataset)).assessment.answer, Answer::Calibrated);
 
     let reasons = |dataset: &Dataset| {
@@ -296,6 +301,9 @@ fn an_outlier_drift_and_few_parameters_are_reasons_for_reserve() {
     };
     dataset.rows[17].measurement.length_m += 2e-3;
     assert!(reasons(&dataset).contains("1 length stands out"), "{}", reasons(&dataset));
+    let without = facts(&puma, &dataset, &fit(&puma.design, &dataset, &FitOptions::default()).expect("enough poses"));
+    let left_out: Vec<usize> = without.left_out.iter().map(|(row, _)| row.number).collect();
+    assert_eq!((left_out, without.rows.len()), (vec![dataset.rows[17].number], dataset.rows.len() - 1));
 
     dataset.rows[17].measurement.length_m -= 2e-3;
     let drifting = |mut dataset: Dataset| {
@@ -354,7 +362,11 @@ fn figures_that_cannot_be_drawn_say_why() {
     let hold = names.collect::<Vec<_>>().join(",");
     let run = host_cal_in(
         folder.path(),
-        &[&["report", "two.csv", "--out", "report.html", "--svg", "figures", "--hold", &hold, "--json"][..], &DESIGN].concat(),
+        &[
+            &["report", "two.csv", "--out", "report.html", "--svg", "figures", "--hold", &hold, "--prior", "none", "--json"][..],
+            &DESIGN,
+        ]
+        .concat(),
     );
     assert_eq!(run.code, 1, "{}", run.transcript());
     let told = run.json();

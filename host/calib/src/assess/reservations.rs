@@ -183,15 +183,15 @@ fn noise(evidence: &Evidence<'_>) -> Option<String> {
 fn released(released: &Released) -> String {
     let Released { part, change, tolerance } = *released;
     let times = fixed(change.abs() / tolerance, 0);
+    const OTHER: &str = "is this the design of another robot, or was a part changed?";
+    let (millimetres, degrees) = (format!("{} mm", fixed(mm_from_m(change), 2)), fixed(change.to_degrees(), 2));
     let (size, cause) = match part {
         Part::Offset(_, JointKind::Revolute) => (format!("{:+.1}°", change.to_degrees()), "was its mastering lost?"),
-        Part::Offset(_, JointKind::Prismatic) => (format!("{} mm", fixed(mm_from_m(change), 2)), "was its zero lost?"),
-        Part::Displacement(_) => {
-            (format!("{} mm", fixed(mm_from_m(change), 2)), "is this the design of another robot, or was a part changed?")
-        }
-        Part::Rotation(_) => {
-            (format!("{:.2}°", change.to_degrees()), "is this the design of another robot, or was a part changed?")
-        }
+        Part::Offset(_, JointKind::Prismatic) => (millimetres, "was its zero lost?"),
+        Part::Displacement(1) => (millimetres, "does the robot stand where its file says?"),
+        Part::Rotation(1) => (format!("{degrees}°"), "does the robot stand as its file says?"),
+        Part::Displacement(_) => (millimetres, OTHER),
+        Part::Rotation(_) => (format!("{degrees}°"), OTHER),
         Part::Scale(_) => (fixed(change, 5), "is its gear another one?"),
     };
     let part = part.to_string();

@@ -121,14 +121,12 @@ pub fn explanation(status: Status) -> &'static str {
         Status::Converged(ConvergenceTest::Step) => "a further step would change the lengths by less than a picometre",
         Status::AlreadyOptimal => "the start was the minimum already: no parameter moved",
         Status::Stalled => {
-            "no step lowered the sum of squares although its gradient is not zero; hold parameters that are weakly excited, or look for wrong rows"
+            "no step lowered the sum of squares although its gradient is not zero: the lengths tell some parameters by a hair, or are wrong"
         }
         Status::NothingObservable => {
             "no parameter is free, or no length depends on a free one; measure other poses, look for wrong rows, or hold fewer parameters"
         }
-        Status::IterationLimit => {
-            "as many steps as may be tried were, before a minimum was reached; hold more parameters, or only those that the poses do not tell"
-        }
+        Status::IterationLimit => "as many steps as may be tried were, and none of the robots on the way explains the lengths",
         Status::NotFinite => "the residuals at the start are not finite numbers",
     }
 }

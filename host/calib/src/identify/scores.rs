@@ -199,9 +199,9 @@ fn several(kind: Kind) -> &'static str {
 pub fn unknown_scores(robot: &Robot, rig: &Rig, dataset: &Dataset, fit: &Fit) -> UnknownScores {
     /// A nanometre.
     const LEAST_M: f64 = 1e-9;
-    let Some(seen_m) = fit.uncertainty.sigma_m.filter(|&seen_m| seen_m > LEAST_M && fit.solution.status.is_minimum()) else {
+    if !fit.uncertainty.sigma_m.is_some_and(|seen_m| seen_m > LEAST_M) || !fit.solution.status.is_minimum() {
         return UnknownScores::default();
-    };
+    }
     let fitted = fit.unknowns.kinds();
     let mut refused = Vec::new();
     let mut blocks: Vec<AnyBlock> = Vec::new();
@@ -211,7 +211,7 @@ pub fn unknown_scores(robot: &Robot, rig: &Rig, dataset: &Dataset, fit: &Fit) ->
             Err(error) => refused.push((kind, NoScore::Lacks(error))),
         }
     }
-    let beside = Beside::new(fit, dataset, seen_m, blocks);
+    let beside = Beside::new(fit, dataset, blocks);
     let mut scores = Vec::new();
     for (at, (kind, range)) in beside.blocks.iter().enumerate() {
         let same = beside.blocks[..at].iter().find(|(_, other)| beside.are_the_same(other, range));
@@ -252,7 +252,7 @@ struct Beside {
 }
 
 impl Beside {
-    fn new(fit: &Fit, dataset: &Dataset, seen_m: f64, blocks: Vec<AnyBlock>) -> Self {
+    fn new(fit: &Fit, dataset: &Dataset, blocks: Vec<AnyBlock>) -> Self {
         let first = fit.unknowns.list().len();
         let kinds: Vec<Kind> = blocks.iter().map(AnyBlock::kind).collect();
         let unknowns = fit.unknowns.with(blocks);
@@ -269,19 +269,23 @@ impl Beside {
             dataset.rows.iter().zip(&fit.residuals).filter(|(_, f)| f.weight > 0.0).map(|(row, _)| row).collect();
         let starts = unknowns.list()[first..].iter().map(|unknown| unknown.start);
         let values: Vec<f64> = fit.solution.values.iter().copied().chain(starts).collect();
-        // What is believed of the fitted ones is in their covariance.
         let observation = Observation::of(&unknowns, &values, &rows, None);
 
         let moving: Vec<usize> = (0..first).filter(|&index| fit.parameters[index].held.is_none()).collect();
+        // What beliefs say of the fitted ones is left aside: where they are wrong, it would look like something else that was not fitted.
+        let scales = column_scales(&observation.jacobian);
+        let scaled = DMatrix::from_fn(observation.jacobian.nrows(), moving.len(), |row, column| {
+            observation.jacobian[(row, moving[column])] / scales[moving[column]]
+        });
+        let basis = PivotedColumns::new(scaled, RANK_THRESHOLD).basis;
         let columns = observation.jacobian.columns(first, unknowns.list().len() - first);
-        let shared = observation.columns(&moving).tr_mul(&columns);
-        // (JᵀJ + σ²Λ)⁻¹ is the covariance over the variance that it was made with.
-        let noise_m = fit.uncertainty.noise_m.unwrap_or(seen_m);
-        let followed = shared.tr_mul(&(&fit.uncertainty.covariance * &shared)) / (noise_m * noise_m);
-        let left = columns.tr_mul(&columns) - followed;
-        let pull = columns.tr_mul(&observation.residual_m);
+        let columns = columns - &basis * basis.tr_mul(&columns);
+        let residual_m = &observation.residual_m - &basis * basis.tr_mul(&observation.residual_m);
+        let left = columns.tr_mul(&columns);
+        let pull = columns.tr_mul(&residual_m);
 
-        let freedom = fit.uncertainty.freedom;
+        let freedom = (rows.len() as f64 - basis.ncols() as f64).max(0.0);
+        let seen_m = (residual_m.norm_squared() / freedom.max(1.0)).sqrt();
         let seen = Noise::Seen { square_m2: seen_m * seen_m * freedom, freedom };
         let noise =
             dataset.stated_sigma_m().filter(|stated_m| !is_beyond(*stated_m, seen_m, freedom)).map_or(seen, Noise::Stated);
