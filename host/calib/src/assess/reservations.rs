@@ -136,6 +136,7 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
     let mut far = large_changes_of(&robot.chain, fit);
     far.retain(|change| !is_released(change, fit));
     if !far.is_empty() && !is_unchanged {
+    reserves.extend(shared_errors(evidence));
         reserves.push(format!(
             "{}: far more than designs are off. Does the robot stand, and is its tool, as its file says?",
             moved(&far)
@@ -183,6 +184,24 @@ fn noise(evidence: &Evidence<'_>) -> Option<String> {
 fn released(released: &Released) -> String {
     let Released { part, change, tolerance } = *released;
     let times = fixed(change.abs() / tolerance, 0);
+/// Errors of configurations that matter.
+fn shared_errors(evidence: &Evidence<'_>) -> Option<String> {
+    /// Deviations that are larger by less are as good as those of independent lengths.
+    const MUCH: f64 = 1.25;
+    let shared = evidence.fit.uncertainty.shared.filter(|shared| shared.are_certain() && shared.factor > MUCH)?;
+    let kinds = evidence.robot.chain.joint_kinds();
+    let size = if kinds.contains(&JointKind::Revolute) {
+        format!("{}°", fixed(shared.joint.to_degrees(), 3))
+    } else {
+        format!("{} mm", fixed(mm_from_m(shared.joint), 3))
+    };
+    Some(format!(
+        "Lengths of one configuration share an error, as joints make that stand {size} from where they say: parameters deviate {:.1} times more than by \
+         independent lengths. More configurations help, more lengths in each do not.",
+        shared.factor
+    ))
+}
+
     let (size, cause) = match part {
         Part::Offset(_, JointKind::Revolute) => (format!("{:+.1}°", change.to_degrees()), "was its mastering lost?"),
         Part::Offset(_, JointKind::Prismatic) => (format!("{} mm", fixed(mm_from_m(change), 2)), "was its zero lost?"),

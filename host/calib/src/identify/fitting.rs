@@ -179,13 +179,14 @@ fn fit_as_written(
     let began = Instant::now();
     let (mut estimate, mut wrong_rows) = estimated(&estimator, &all_rows, &start, options.loss);
     let mut kept = kept_rows(&all_rows, &wrong_rows);
-    let mut uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, chain_prior.is_some());
+    let stated_m = estimator.stated_m.filter(|_| chain_prior.is_some());
+    let mut uncertainty = estimate.uncertainty(&unknowns, &kept, stated_m, stated_m);
     if let Some(seen_m) = uncertainty.beyond_stated_m(estimator.stated_m).filter(|_| chain_prior.is_some()) {
         // What the rows state is not what they do: beliefs are weighed against what they do.
         estimator.stated_m = Some(seen_m);
         (estimate, wrong_rows) = estimated(&estimator, &all_rows, &start, options.loss);
         kept = kept_rows(&all_rows, &wrong_rows);
-        uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, true);
+        uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, None);
     }
     let solve_time = began.elapsed();
 

@@ -21,6 +21,7 @@ mod hold;
 mod identifiability;
 mod in_user_frames;
 mod lm;
+mod lines;
 mod noise;
 mod normality;
 mod observation;
@@ -33,6 +34,7 @@ mod residual;
 mod residuals;
 mod robust;
 mod spectrum;
+mod shared_errors;
 mod trend;
 mod uncertainty;
 
@@ -57,4 +59,5 @@ pub use residuals::{ALIKE, Outlier, OutlierTest, PairingResiduals, by_pairing, n
 pub use robust::WrongRow;
 pub use spectrum::{RANK_THRESHOLD, Spectrum};
 pub use trend::Trend;
+pub use shared_errors::SharedErrors;
 pub use uncertainty::Uncertainty;
