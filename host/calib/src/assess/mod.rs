@@ -16,6 +16,7 @@ mod order;
 mod plausibility;
 mod proof;
 mod refusals;
+mod reach;
 mod reservations;
 mod suspicion;
 

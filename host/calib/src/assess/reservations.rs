@@ -5,6 +5,7 @@ use super::evidence::Evidence;
 use super::plausibility::{Change, far_beyond_limits, large_changes_of};
 use super::proof::{Proof, decisive};
 use super::refusals::moved;
+use super::reach::narrow_joints;
 use ballbar::JointKind;
 
 use crate::identify::{ALIKE, AndersonDarling, Fit, Offset, Part, Released, Trend};
@@ -135,6 +136,8 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
     reserves.extend(fit.prior.iter().flat_map(|prior| &prior.released).map(released));
     let mut far = large_changes_of(&robot.chain, fit);
     far.retain(|change| !is_released(change, fit));
+    reserves.extend(shared_errors(evidence));
+    reserves.extend(narrow_joints(robot, dataset));
     if !far.is_empty() && !is_unchanged {
     reserves.extend(shared_errors(evidence));
         reserves.push(format!(
