@@ -38,6 +38,11 @@ pub struct Proof {
 const FEWEST: usize = 8;
 
 impl Proof {
+    /// Of a group of fitted rows, beside another prediction of them.
+    pub(super) fn of_group(before: Vec<Residual>, after: Vec<Residual>, postures: Vec<usize>) -> Self {
+        Self { name: String::new(), kind: ProofKind::LeftOut, before, after, postures }
+    }
+
     /// Size of the residuals with the design.
     pub fn before_summary(&self) -> ResidualSummary {
         ResidualSummary::new(&self.before)
@@ -70,6 +75,13 @@ impl Proof {
         let square = |residual: &Residual| residual.weight * residual.value_m.powi(2);
         let gain = self.mean_and_error(|row| square(&self.before[row]) - square(&self.after[row]));
         gain.is_some_and(|(mean, error)| mean > 2.0 * error)
+    }
+
+    /// Whether what is predicted after is worse than before, by so many standard errors of the difference.
+    pub(super) fn is_worse_by(&self, errors: f64) -> bool {
+        let square = |residual: &Residual| residual.weight * residual.value_m.powi(2);
+        let loss = self.mean_and_error(|row| square(&self.after[row]) - square(&self.before[row]));
+        loss.is_some_and(|(mean, error)| mean > errors * error)
     }
 
     /// Mean of a value over the rows and its standard error, rows of one posture taken together; `None` for too few postures.

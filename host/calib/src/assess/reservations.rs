@@ -1,11 +1,12 @@
 //! What weighs on the numbers of a fit that is worth keeping, in whole sentences.
 
+use super::by_group::{GroupProofs, unlike};
 use super::causes::Cause;
 use super::evidence::Evidence;
 use super::plausibility::{Change, far_beyond_limits, large_changes_of};
 use super::proof::{Proof, decisive};
-use super::refusals::moved;
 use super::reach::narrow_joints;
+use super::refusals::moved;
 use ballbar::JointKind;
 
 use crate::identify::{ALIKE, AndersonDarling, Fit, Offset, Part, Released, Trend};
@@ -28,6 +29,7 @@ pub(super) struct Grounds<'a> {
     pub(super) is_unchanged: bool,
     pub(super) causes: &'a [Cause],
     pub(super) proofs: &'a [Proof],
+    pub(super) by_group: &'a [GroupProofs],
     pub(super) trend: Option<Trend>,
     pub(super) farthest_offset: Option<Offset>,
     pub(super) normality: Option<AndersonDarling>,
@@ -132,14 +134,14 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
             ));
         }
     }
+    reserves.extend(unlike(grounds.by_group));
     reserves.extend(noise(evidence));
+    reserves.extend(shared_errors(evidence));
+    reserves.extend(narrow_joints(robot, dataset));
     reserves.extend(fit.prior.iter().flat_map(|prior| &prior.released).map(released));
     let mut far = large_changes_of(&robot.chain, fit);
     far.retain(|change| !is_released(change, fit));
-    reserves.extend(shared_errors(evidence));
-    reserves.extend(narrow_joints(robot, dataset));
     if !far.is_empty() && !is_unchanged {
-    reserves.extend(shared_errors(evidence));
         reserves.push(format!(
             "{}: far more than designs are off. Does the robot stand, and is its tool, as its file says?",
             moved(&far)
@@ -183,10 +185,6 @@ fn noise(evidence: &Evidence<'_>) -> Option<String> {
     }
 }
 
-/// A part that was fitted as if nothing had been known of it.
-fn released(released: &Released) -> String {
-    let Released { part, change, tolerance } = *released;
-    let times = fixed(change.abs() / tolerance, 0);
 /// Errors of configurations that matter.
 fn shared_errors(evidence: &Evidence<'_>) -> Option<String> {
     /// Deviations that are larger by less are as good as those of independent lengths.
@@ -205,6 +203,10 @@ fn shared_errors(evidence: &Evidence<'_>) -> Option<String> {
     ))
 }
 
+/// A part that was fitted as if nothing had been known of it.
+fn released(released: &Released) -> String {
+    let Released { part, change, tolerance } = *released;
+    let times = fixed(change.abs() / tolerance, 0);
     let (size, cause) = match part {
         Part::Offset(_, JointKind::Revolute) => (format!("{:+.1}°", change.to_degrees()), "was its mastering lost?"),
         Part::Offset(_, JointKind::Prismatic) => (format!("{} mm", fixed(mm_from_m(change), 2)), "was its zero lost?"),

@@ -10,6 +10,7 @@ use super::beliefs::Beliefs;
 use super::cross_validation::cross_validate;
 use super::estimate::{Estimate, Estimator, Rule};
 use super::fit::{Fit, FittedParameter, PriorFacts, Released};
+use super::groups::leave_groups_out;
 use super::hold::{Held, Hold};
 use super::identifiability::Identifiability;
 use super::in_user_frames::in_user_frames;
@@ -213,6 +214,8 @@ fn fit_as_written(
         kept.into_iter().zip(of_kept).for_each(|(row, residual)| left_out[row] = residual);
         left_out
     });
+    let kept_indices: Vec<usize> = (0..dataset.rows.len()).filter(|&row| !is_wrong(row)).collect();
+    let left_out_groups = leave_groups_out(dataset, &kept_indices, (&unknowns, &solution.values), &beliefs, &uncertainty);
     Ok(Fit {
         solve_time,
         identifiability,
@@ -233,6 +236,7 @@ fn fit_as_written(
         neighbour_correlation,
         cross_validation,
         left_out,
+        left_out_groups,
         base_alone,
         residuals: after,
         uncertainty,
