@@ -219,8 +219,10 @@ fn headline(document: &FitDocument) -> String {
     );
     text += &format!("RMS {:.4} mm before, {:.4} mm after", document.rms_initial_mm, document.rms_mm);
     if let Some(prior) = &document.prior {
-        text +=
-            &format!("; lengths decide {:.1} of them, tolerances inside the arm times {:.2} the rest", prior.told, prior.factor);
+        text += &format!(
+            "; lengths decide {:.1} parameters, the tolerances of the robot's file (inside the arm times {:.2}) the rest",
+            prior.told, prior.factor
+        );
     }
     if let Some(held_out) = &document.held_out {
         text += &format!("; {:.4} mm on poses left out ({} folds)", held_out.rms_mm, held_out.folds);

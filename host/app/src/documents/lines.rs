@@ -50,7 +50,8 @@ pub struct ResidualLine {
 
 /// The rows with the largest residuals, the worst first.
 pub fn largest(dataset: &Dataset, rig: &Rig, residuals: &[Residual], count: usize) -> Vec<ResidualLine> {
-    let mut order: Vec<usize> = (0..residuals.len()).collect();
+    // Those that were left out of a fit are told of elsewhere.
+    let mut order: Vec<usize> = (0..residuals.len()).filter(|&row| residuals[row].weight > 0.0).collect();
     let size = |row: usize| residuals[row].value_m.abs();
     order.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
     let line = |&row: &usize| ResidualLine {

@@ -1,5 +1,6 @@
 //! The answer, and its grounds in whole sentences.
 
+use super::by_group::{GroupProofs, by_group};
 use super::causes::{Cause, CauseKind, FittedRows, causes};
 use super::evidence::Evidence;
 use super::order::{Order, by_pairing, offset, trend};
@@ -65,6 +66,8 @@ pub struct Assessment {
     pub rms_limit: RmsLimit,
     /// What the fit has not seen: files and poses held out, its own poses left out in turn, then other lengths of fitted postures.
     pub proofs: Vec<Proof>,
+    /// How well bars, sets, files, pairings and what was measured in one go are predicted by the others, as far as there are several of a kind.
+    pub by_group: Vec<GroupProofs>,
     /// The order of measurement.
     pub order: Order,
     /// Residuals with the fit by pairing, in the order of `Dataset::pairings`.
@@ -111,6 +114,7 @@ impl Assessment {
         let counting = fit.residuals.iter().filter(|residual| residual.weight > 0.0);
         let whitened_m: Vec<f64> = counting.map(|residual| residual.whitened_m()).collect();
         let rms_limit = RmsLimit::new(dataset, evidence.max_rms_m);
+        let before = fit.counted(residuals(&robot.kinematics(), dataset));
         let mut assessment = Self {
             answer: Answer::NotTrusted,
             reasons: Vec::new(),
@@ -118,14 +122,15 @@ impl Assessment {
             suspicion: None,
             causes: causes_of(evidence),
             rms_limit,
-            proofs: proofs(evidence, fit.counted(residuals(&robot.kinematics(), dataset))),
+            by_group: by_group(evidence, &before),
+            proofs: proofs(evidence, before),
             trend: trend(evidence, &placed),
             farthest_offset: offset(evidence, &placed),
             by_pairing: placed.into_iter().map(|group| group.into_iter().map(|(_, residual)| residual).collect()).collect(),
             normality: anderson_darling(&whitened_m),
             order,
         };
-        match judge(evidence, rms_limit, &assessment.proofs) {
+        match judge(evidence, rms_limit, &assessment.proofs, &assessment.by_group) {
             Judged::Refused(refusals) => {
                 assessment.suspicion = suspect(evidence, &refusals);
                 assessment.reasons.extend(refusals.iter().map(Refusal::to_string));
@@ -152,9 +157,10 @@ impl Assessment {
     }
 
     fn grounds(&self) -> Grounds<'_> {
-        let Self { causes, proofs, trend, farthest_offset, normality, .. } = self;
+        let Self { causes, proofs, by_group, trend, farthest_offset, normality, .. } = self;
         let is_unchanged = self.answer == Answer::Unchanged;
-        Grounds { is_unchanged, causes, proofs, trend: *trend, farthest_offset: *farthest_offset, normality: *normality }
+        let (trend, farthest_offset, normality) = (*trend, *farthest_offset, *normality);
+        Grounds { is_unchanged, causes, proofs, by_group, trend, farthest_offset, normality }
     }
 
     /// The proof that says the least good of the fit: the one to go by.

@@ -9,17 +9,20 @@
 //! `docs/identification.md` says what each answer takes and why.
 
 mod assessment;
+mod by_group;
 mod causes;
 mod evidence;
 mod mistake;
 mod order;
 mod plausibility;
 mod proof;
+mod reach;
 mod refusals;
 mod reservations;
 mod suspicion;
 
 pub use assessment::{Answer, Assessment};
+pub use by_group::{GroupProof, GroupProofs};
 pub use causes::{AngleUnit, Cause, CauseKind, FittedRows, LengthUnit, RowsOf, causes};
 pub use evidence::Evidence;
 pub use mistake::Mistake;

@@ -35,6 +35,11 @@ pub struct Proof {
 }
 
 impl Proof {
+    /// Of a group of fitted rows, beside another prediction of them.
+    pub(super) fn of_group(before: Vec<Residual>, after: Vec<Residual>, postures: Vec<usize>) -> Self {
+        Self { name: String::new(), kind: ProofKind::LeftOut, before, after, postures }
+    }
+
     /// Size of the residuals with the design.
     pub fn before_summary(&self) -> ResidualSummary {
         ResidualSummary::new(&self.before)
@@ -67,6 +72,13 @@ impl Proof {
         let square = |residual: &Residual| residual.weight * residual.value_m.powi(2);
         let gain = mean_and_error(&self.postures, |row| square(&self.before[row]) - square(&self.after[row]));
         gain.is_some_and(|(mean, error)| mean > 2.0 * error)
+    }
+
+    /// Whether what is predicted after is worse than before, by so many standard errors of the difference.
+    pub(super) fn is_worse_by(&self, errors: f64) -> bool {
+        let square = |residual: &Residual| residual.weight * residual.value_m.powi(2);
+        let loss = mean_and_error(&self.postures, |row| square(&self.after[row]) - square(&self.before[row]));
+        loss.is_some_and(|(mean, error)| mean > errors * error)
     }
 }
 

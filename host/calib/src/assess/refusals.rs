@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::by_group::{GroupProofs, design_is_better};
 use super::evidence::Evidence;
 use super::plausibility::{Change, far_beyond_limits, large_changes_of};
 use super::proof::{Proof, ProofKind};
@@ -180,7 +181,7 @@ fn is_as_good(fit: &Fit, limit: RmsLimit) -> bool {
     rms_m <= limit.limit_m && fit.uncertainty.sigma_m.is_some_and(|sigma_m| rms_m <= DEVIATIONS * sigma_m)
 }
 
-pub(super) fn judge(evidence: &Evidence<'_>, limit: RmsLimit, proofs: &[Proof]) -> Judged {
+pub(super) fn judge(evidence: &Evidence<'_>, limit: RmsLimit, proofs: &[Proof], by_group: &[GroupProofs]) -> Judged {
     let Evidence { robot, dataset, fit, .. } = evidence;
     let mut refusals = Vec::new();
     let mut is_unchanged = fit.solution.status == Status::AlreadyOptimal;
@@ -205,6 +206,11 @@ pub(super) fn judge(evidence: &Evidence<'_>, limit: RmsLimit, proofs: &[Proof]) 
             name: proof.name.clone(),
             before_m: proof.before_summary().rms_m,
             after_m: proof.after_summary().rms_m,
+        }));
+        refusals.extend(design_is_better(by_group).map(|group| Refusal::Worse {
+            name: format!("lengths {}, while none of them is fitted", group.name),
+            before_m: group.before_m,
+            after_m: group.after_m,
         }));
         let impossible: Vec<Change> =
             large_changes_of(&robot.chain, fit).into_iter().filter(|change| change.is_impossible).collect();

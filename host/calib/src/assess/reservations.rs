@@ -1,9 +1,11 @@
 //! What weighs on the numbers of a fit that is worth keeping, in whole sentences.
 
+use super::by_group::{GroupProofs, unlike};
 use super::causes::Cause;
 use super::evidence::Evidence;
 use super::plausibility::{Change, far_beyond_limits, large_changes_of};
 use super::proof::{Proof, decisive};
+use super::reach::narrow_joints;
 use super::refusals::moved;
 use ballbar::JointKind;
 
@@ -27,6 +29,7 @@ pub(super) struct Grounds<'a> {
     pub(super) is_unchanged: bool,
     pub(super) causes: &'a [Cause],
     pub(super) proofs: &'a [Proof],
+    pub(super) by_group: &'a [GroupProofs],
     pub(super) trend: Option<Trend>,
     pub(super) farthest_offset: Option<Offset>,
     pub(super) normality: Option<AndersonDarling>,
@@ -131,7 +134,10 @@ pub(super) fn reservations(evidence: &Evidence<'_>, grounds: &Grounds<'_>) -> Ve
             ));
         }
     }
+    reserves.extend(unlike(grounds.by_group));
     reserves.extend(noise(evidence));
+    reserves.extend(shared_errors(evidence));
+    reserves.extend(narrow_joints(robot, dataset));
     reserves.extend(fit.prior.iter().flat_map(|prior| &prior.released).map(released));
     let mut far = large_changes_of(&robot.chain, fit);
     far.retain(|change| !is_released(change, fit));
@@ -177,6 +183,24 @@ fn noise(evidence: &Evidence<'_>) -> Option<String> {
             )
         })
     }
+}
+
+/// Errors of configurations that matter.
+fn shared_errors(evidence: &Evidence<'_>) -> Option<String> {
+    /// Deviations that are larger by less are as good as those of independent lengths.
+    const MUCH: f64 = 1.25;
+    let shared = evidence.fit.uncertainty.shared.filter(|shared| shared.are_certain() && shared.factor > MUCH)?;
+    let kinds = evidence.robot.chain.joint_kinds();
+    let size = if kinds.contains(&JointKind::Revolute) {
+        format!("{}°", fixed(shared.joint.to_degrees(), 3))
+    } else {
+        format!("{} mm", fixed(mm_from_m(shared.joint), 3))
+    };
+    Some(format!(
+        "Lengths of one configuration share an error, as joints make that stand {size} from where they say: parameters deviate {:.1} times more than by \
+         independent lengths. More configurations help, more lengths in each do not.",
+        shared.factor
+    ))
 }
 
 /// A part that was fitted as if nothing had been known of it.

@@ -38,14 +38,21 @@ impl Beliefs {
         &self.free
     }
 
-    /// `Λ`, free × free; `None` where nothing is believed.
-    pub(super) fn precision(&self) -> Option<&DMatrix<f64>> {
-        self.precision.as_ref()
-    }
-
     /// Of how many of them something is believed.
     pub(super) fn believed(&self) -> usize {
         self.precision.as_ref().map_or(0, |precision| precision.diagonal().iter().filter(|entry| **entry > 0.0).count())
+    }
+
+    /// `Λ` with so little said of what nothing is believed of that it decides nothing: for what integrates over all of them.
+    pub(super) fn proper_precision(&self, unknowns: &Unknowns) -> DMatrix<f64> {
+        const VAGUE: f64 = 100.0;
+        let mut precision = self.precision.clone().unwrap_or_else(|| DMatrix::zeros(self.free.len(), self.free.len()));
+        for (i, &index) in self.free.iter().enumerate() {
+            if precision[(i, i)] == 0.0 {
+                precision[(i, i)] = (VAGUE * unknowns.list()[index].plausible).powi(-2);
+            }
+        }
+        precision
     }
 
     /// How far the free ones have moved.

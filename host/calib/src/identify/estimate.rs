@@ -9,7 +9,8 @@ use super::lm::{Objective, Solution, solve};
 use super::observation::Observation;
 use super::prior::{ChainPrior, Part, Share, Weighing};
 use super::residual::{Residual, ResidualSummary};
-use super::uncertainty::Uncertainty;
+use super::shared_errors::{Fitted, shared_errors};
+use super::uncertainty::{Uncertainty, inverse_root};
 use crate::model::PoseRow;
 use crate::unknowns::Unknowns;
 
@@ -159,7 +160,7 @@ impl Estimator<'_> {
         let change = beliefs.change(values, &self.unknowns.start());
         let residual_m = observation.residual_m + &jacobian * DVector::from_vec(change);
         let linear = Linear { jacobian, residual_m, count: rows.len() };
-        likeliest(&linear, |factor| with_factor(factor).precision().cloned().unwrap_or_default(), self.stated_m)
+        likeliest(&linear, |factor| with_factor(factor).proper_precision(self.unknowns), self.stated_m)
     }
 
     fn solve(&self, rows: &[&PoseRow], beliefs: &Beliefs, sigma_m: f64) -> Solution {
@@ -185,15 +186,26 @@ impl Estimator<'_> {
 
 impl Estimate {
     /// Deviations at the solution, by rows that it was made from: of plain least squares by what residuals show, beside a prior by what is stated.
+    /// `own_m` is the deviation that lengths have of their own, where that is stated and may be so, metres.
     pub(super) fn uncertainty(
         &self,
         unknowns: &Unknowns,
         rows: &[&PoseRow],
         stated_m: Option<f64>,
-        has_prior: bool,
+        own_m: Option<f64>,
     ) -> Uncertainty {
-        let observation = Observation::of(unknowns, &self.solution.values, rows, Some((&self.beliefs, self.sigma_m)));
-        Uncertainty::with_noise(&observation, self.beliefs.free(), |seen_m, _| stated_m.filter(|_| has_prior).or(seen_m))
+        let Self { beliefs, sigma_m, solution, .. } = self;
+        let free = beliefs.free();
+        let observation = Observation::of(unknowns, &solution.values, rows, Some((beliefs, *sigma_m)));
+        let mut uncertainty = Uncertainty::with_noise(&observation, free, stated_m);
+        uncertainty.deviations_known = own_m.is_none().then_some(uncertainty.freedom);
+        let believed = observation.beliefs.select_columns(free);
+        let root = inverse_root(&uncertainty.spectrum);
+        let fitted = Fitted { unknowns, values: &solution.values, beliefs, sigma_m: *sigma_m, believed: &believed, root: &root };
+        match uncertainty.sigma_m.and_then(|seen_m| shared_errors(&fitted, rows, seen_m, own_m)) {
+            Some(found) => uncertainty.with_shared_errors(found),
+            None => uncertainty,
+        }
     }
 
     fn shares(&self, chain: &ChainPrior, start: &[f64]) -> Vec<Share> {

@@ -90,7 +90,7 @@ impl Rotated {
 }
 
 /// Where a function of one argument that falls and then rises is smallest, to within `width`.
-fn golden_section(cost: impl Fn(f64) -> f64, mut low: f64, mut high: f64, width: f64) -> f64 {
+pub(super) fn golden_section(cost: impl Fn(f64) -> f64, mut low: f64, mut high: f64, width: f64) -> f64 {
     const RATIO: f64 = 0.618_033_988_749_894_9;
     let inner = |low: f64, high: f64| (high - RATIO * (high - low), low + RATIO * (high - low));
     let (mut left, mut right) = inner(low, high);

@@ -5,6 +5,7 @@ use std::time::Duration;
 use ballbar::{Chain, JointTerms, Parameter, ParameterKind, ParameterUnit};
 
 use super::cross_validation::CrossValidation;
+use super::groups::LeftOutGroup;
 use super::hold::Held;
 use super::identifiability::Identifiability;
 use super::lm::Solution;
@@ -96,6 +97,8 @@ pub struct Fit {
     pub cross_validation: Option<CrossValidation>,
     /// Residuals of all rows while they were left out; none where there is no cross-validation.
     pub left_out: Vec<Residual>,
+    /// Bars, sets, files, pairings and what was measured in one go, as far as there are several: each predicted by the others.
+    pub left_out_groups: Vec<LeftOutGroup>,
     /// Residuals when only where the robot's base stands is fitted, the six parameters of its first link; `None` when one of them is held by
     /// name.
     pub base_alone: Option<ResidualSummary>,

@@ -10,6 +10,7 @@ use super::beliefs::Beliefs;
 use super::cross_validation::cross_validate;
 use super::estimate::{Estimate, Estimator, Rule};
 use super::fit::{Fit, FittedParameter, PriorFacts, Released};
+use super::groups::leave_groups_out;
 use super::hold::{Held, Hold};
 use super::identifiability::Identifiability;
 use super::in_user_frames::in_user_frames;
@@ -179,13 +180,14 @@ fn fit_as_written(
     let began = Instant::now();
     let (mut estimate, mut wrong_rows) = estimated(&estimator, &all_rows, &start, options.loss);
     let mut kept = kept_rows(&all_rows, &wrong_rows);
-    let mut uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, chain_prior.is_some());
+    let stated_m = estimator.stated_m.filter(|_| chain_prior.is_some());
+    let mut uncertainty = estimate.uncertainty(&unknowns, &kept, stated_m, stated_m);
     if let Some(seen_m) = uncertainty.beyond_stated_m(estimator.stated_m).filter(|_| chain_prior.is_some()) {
         // What the rows state is not what they do: beliefs are weighed against what they do.
         estimator.stated_m = Some(seen_m);
         (estimate, wrong_rows) = estimated(&estimator, &all_rows, &start, options.loss);
         kept = kept_rows(&all_rows, &wrong_rows);
-        uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, true);
+        uncertainty = estimate.uncertainty(&unknowns, &kept, estimator.stated_m, None);
     }
     let solve_time = began.elapsed();
 
@@ -212,6 +214,8 @@ fn fit_as_written(
         kept.into_iter().zip(of_kept).for_each(|(row, residual)| left_out[row] = residual);
         left_out
     });
+    let kept_indices: Vec<usize> = (0..dataset.rows.len()).filter(|&row| !is_wrong(row)).collect();
+    let left_out_groups = leave_groups_out(dataset, &kept_indices, (&unknowns, &solution.values), &beliefs, &uncertainty);
     Ok(Fit {
         solve_time,
         identifiability,
@@ -232,6 +236,7 @@ fn fit_as_written(
         neighbour_correlation,
         cross_validation,
         left_out,
+        left_out_groups,
         base_alone,
         residuals: after,
         uncertainty,
