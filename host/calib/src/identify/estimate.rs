@@ -46,7 +46,7 @@ pub(super) struct Estimate {
 
 /// A part that changed by more of its tolerances is not as its tolerance says.
 const BEYOND: f64 = 4.0;
-/// Lengths that are off by more are wrong, and no part explains them: what far more tolerances than lengths could hold back is small.
+/// Lengths that are off by more are wrong: however tight the tolerances, many lengths are not held back by as much.
 const HOPELESS_M: f64 = 5e-3;
 /// More parts than this are not lost: the lengths are wrong, or the design is.
 const MOST_RELEASED: usize = 6;

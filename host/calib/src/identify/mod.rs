@@ -2,9 +2,18 @@
 //!
 //! ```text
 //! Dataset, Unknowns ─▶ Observation (J, f at the start) ─▶ Identifiability (rank, independent subset, reasons)
-//!                                                               │ Hold
-//!                                                               ▼
-//!                                                  Objective ─▶ lm::solve ─▶ Fit (deviations, residuals, outliers, held-out RMS)
+//! Tolerances ─▶ ChainPrior ──────────────┐                      │ Hold
+//!                                        ▼                      ▼
+//!               ┌─────────────▶ Estimator: Beliefs, Objective ─▶ lm::solve ─▶ evidence (factor, σ), released parts
+//!  rows that do │                                                 │ Estimate
+//!  not stand out│                                                 ▼
+//!               └──────────────────── robust (studentised residuals of all rows)
+//!                                                                 │ nothing changes any more
+//!                                                                 ▼
+//!                                  Fit (deviations, residuals, rows left out, proofs by rows left out in turn)
+//!                                                                 │
+//!                                                                 ▼
+//!                                  scores (what was not fitted and would explain the residuals)
 //! ```
 //!
 //! `docs/identification.md` says how each decision is made and why.
