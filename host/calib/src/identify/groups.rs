@@ -104,7 +104,7 @@ pub(super) fn leave_groups_out(
         sigma_m,
         freedom: uncertainty.freedom,
     };
-    let groups = groups(dataset, kept, &rows, &configurations);
+    let groups = groups(kept, &rows, &configurations);
     let left_out = |(group, members): (Group, Vec<usize>)| fitted.without(group, &members, kept);
     groups.into_iter().filter_map(left_out).collect()
 }
@@ -164,17 +164,17 @@ impl Fitted<'_> {
 }
 
 /// Groups and their rows, indices into `rows`; a kind that parts the rows as one before it does is not taken.
-fn groups(dataset: &Dataset, kept: &[usize], rows: &[&PoseRow], configurations: &[usize]) -> Vec<(Group, Vec<usize>)> {
+fn groups(kept: &[usize], rows: &[&PoseRow], configurations: &[usize]) -> Vec<(Group, Vec<usize>)> {
     /// Bars whose lengths differ by less are one.
     const SAME_M: f64 = 1e-6;
     let all = |of: &dyn Fn(&PoseRow) -> Option<Group>| -> Option<Vec<Group>> { rows.iter().map(|&row| of(row)).collect() };
     let count = configurations.iter().max().map_or(0, |last| last + 1);
-    let blocks = (count / BLOCK).min(BLOCKS).max(1);
+    let blocks = (count / BLOCK).clamp(1, BLOCKS);
     let block_of: Vec<usize> = configurations.iter().map(|configuration| configuration * blocks / count.max(1)).collect();
     let ends = |block: usize| {
         let mut own = (0..rows.len()).filter(|&row| block_of[row] == block);
         let first = own.next().unwrap_or_default();
-        Group::Block(kept[first], kept[own.last().unwrap_or(first)])
+        Group::Block(kept[first], kept[own.next_back().unwrap_or(first)])
     };
     let ends: Vec<Group> = if rows.is_empty() { Vec::new() } else { (0..blocks).map(ends).collect() };
     let kinds = [
@@ -182,9 +182,9 @@ fn groups(dataset: &Dataset, kept: &[usize], rows: &[&PoseRow], configurations: 
         all(&|row| row.set.clone().map(Group::Set)),
         all(&|row| Some(Group::Place(row.file))),
         all(&|row| Some(Group::Pairing(row.pairing))),
-        Some(block_of.iter().map(|&block| ends[block].clone()).collect()),
+        // Configurations that were come back to make no blocks.
+        block_of.is_sorted().then(|| block_of.iter().map(|&block| ends[block].clone()).collect()),
     ];
-    debug_assert!(kept.iter().all(|&row| row < dataset.rows.len()));
     let mut seen: Vec<Vec<Vec<usize>>> = Vec::new();
     let mut groups = Vec::new();
     for kind in kinds.into_iter().flatten() {
