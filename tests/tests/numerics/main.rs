@@ -10,6 +10,7 @@ mod golden;
 mod gradients;
 mod identification;
 mod joint_terms;
+mod noise;
 mod normal_equations;
 mod precision;
 mod priors;

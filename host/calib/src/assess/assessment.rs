@@ -5,6 +5,7 @@ use super::causes::{Cause, CauseKind, FittedRows, causes};
 use super::evidence::Evidence;
 use super::order::{Order, by_pairing, offset, trend};
 use super::proof::{Proof, decisive, proofs};
+use super::reach::narrow_joints;
 use super::refusals::{Judged, Refusal, RmsLimit, judge};
 use super::reservations::{Grounds, reservations, sentence};
 use super::suspicion::{Suspicion, suspect};
@@ -135,7 +136,8 @@ impl Assessment {
                 assessment.suspicion = suspect(evidence, &refusals);
                 assessment.reasons.extend(refusals.iter().map(Refusal::to_string));
                 let first = assessment.suspicion.as_ref().map(Suspicion::to_string);
-                assessment.reasons.extend(first.or_else(|| assessment.likeliest_cause()));
+                let cause = first.or_else(|| assessment.likeliest_cause());
+                assessment.reasons.extend(cause.or_else(|| narrow_joints(robot, dataset)));
                 assessment.refusals = refusals;
             }
             Judged::NothingToCorrect => {

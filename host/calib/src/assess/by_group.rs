@@ -38,13 +38,13 @@ pub struct GroupProof {
     pub before_m: f64,
     /// RMS while the group was left out, metres.
     pub after_m: f64,
-    /// RMS while single poses were left out, metres; `None` where none were.
-    pub poses_left_out_m: Option<f64>,
+    /// RMS of the same lengths while only parts of them were left out, metres, or what noise would leave where these were measured in one go.
+    pub usual_m: f64,
     /// RMS that noise alone would leave, metres.
     pub expected_m: f64,
     /// Whether other lengths of its configurations were fitted.
     pub shares_configurations: bool,
-    /// Whether it is predicted far worse than its poses are when only they are left out, by more than chance.
+    /// Whether it is predicted far worse than that, by more than chance.
     pub is_unlike: bool,
     /// Whether the design predicts it better than the others do, although they should.
     pub speaks_against: bool,
@@ -56,8 +56,8 @@ const FALSE_ALARMS: f64 = 1e-3;
 const MUCH_WORSE: f64 = 2.0;
 /// Standard errors by which one has to be better than the other.
 const SURELY: f64 = 3.0;
-/// Of what the design leaves, the others have to promise less before the group speaks against them.
-const PROMISED: f64 = 0.5;
+/// The others tell a group when noise, and what beliefs do not know, leaves less than so many deviations of a length there.
+const TOLD: f64 = 2.0;
 
 /// Of all kinds; `before` are the residuals of all rows with the design.
 pub(super) fn by_group(evidence: &Evidence<'_>, before: &[Residual]) -> Vec<GroupProofs> {
@@ -91,21 +91,27 @@ fn group_proof(evidence: &Evidence<'_>, before: &[Residual], left_out: &LeftOutG
     let beside = |other: &[Residual]| Proof::of_group(select(other), residuals.clone(), configurations.clone());
     let by_design = beside(before);
     let (before_m, after_m) = (by_design.before_summary().rms_m, by_design.after_summary().rms_m);
-    let by_folds = (!fit.left_out.is_empty()).then(|| beside(&fit.left_out));
-    let poses_left_out_m = by_folds.as_ref().map(|folds| folds.before_summary().rms_m);
-    let is_far = poses_left_out_m.is_some_and(|folds_m| after_m > MUCH_WORSE * folds_m);
-    let by_error = by_folds.is_some_and(|folds| folds.is_worse_by(SURELY));
+    // Where poses were left out in blocks, whole groups were nearly, too: then what noise would leave is to compare with.
+    let by_poses = fit.cross_validation.is_some_and(|proof| !proof.in_blocks);
+    let usual = if by_poses {
+        beside(&fit.left_out)
+    } else {
+        let of_noise = residuals.iter().map(|by| Residual { value_m: expected_m / by.weight.sqrt(), ..*by }).collect();
+        Proof::of_group(of_noise, residuals.clone(), configurations.clone())
+    };
+    let usual_m = usual.before_summary().rms_m;
+    let is_told = fit.uncertainty.sigma_m.is_some_and(|sigma_m| *expected_m < TOLD * sigma_m);
     let chance = FALSE_ALARMS / fit.left_out_groups.len() as f64;
     GroupProof {
         name: name(evidence, &left_out.group),
         rows: rows.len(),
         before_m,
         after_m,
-        poses_left_out_m,
+        usual_m,
         expected_m: *expected_m,
         shares_configurations: *shares_configurations,
-        is_unlike: is_far && by_error && *p_value < chance,
-        speaks_against: !shares_configurations && *expected_m < PROMISED * before_m && by_design.is_worse_by(SURELY),
+        is_unlike: after_m > MUCH_WORSE * usual_m && usual.is_worse_by(SURELY) && *p_value < chance,
+        speaks_against: !shares_configurations && is_told && by_design.is_worse_by(SURELY),
     }
 }
 
@@ -125,7 +131,7 @@ pub(super) fn unlike(kinds: &[GroupProofs]) -> Option<String> {
     let of_kind = kinds.iter().map(|kind| (kind.kind, kind.groups.iter().filter(|group| group.is_unlike)));
     let (kind, groups) =
         of_kind.map(|(kind, groups)| (kind, groups.collect::<Vec<_>>())).find(|(_, groups)| !groups.is_empty())?;
-    let factor = |group: &GroupProof| group.after_m / group.poses_left_out_m.unwrap_or(f64::NAN);
+    let factor = |group: &GroupProof| group.after_m / group.usual_m;
     let worst = groups.iter().max_by(|a, b| factor(a).total_cmp(&factor(b)))?;
     let question = match kind {
         GroupKind::Bar => "is the zero of each bar right?",

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use ballbar::JointKind;
 
-use crate::model::{Dataset, Robot};
+use crate::model::{Dataset, JointLimits, Robot};
 use crate::units::{fixed, mm_from_m};
 
 /// Joints that were measured in a smaller part of their range are said.
@@ -13,7 +13,7 @@ const NARROW: f64 = 0.2;
 /// A sentence that names all joints that were measured in a small part of their range (or turn, where that is more than one).
 pub(super) fn narrow_joints(robot: &Robot, dataset: &Dataset) -> Option<String> {
     let kinds = robot.chain.joint_kinds();
-    let narrow = |(i, (limits, &kind)): (usize, (&crate::model::JointLimits, &JointKind))| {
+    let narrow = |(i, (limits, &kind)): (usize, (&JointLimits, &JointKind))| {
         let values = dataset.rows.iter().map(|row| row.measurement.q.as_array()[i]);
         let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), q| (least.min(q), most.max(q)));
         let turn = if kind == JointKind::Revolute { TAU } else { f64::INFINITY };

@@ -104,7 +104,7 @@ pub(super) fn leave_groups_out(
         sigma_m,
         freedom: uncertainty.freedom,
     };
-    let groups = groups(dataset, kept, &rows, &configurations);
+    let groups = groups(kept, &rows, &configurations);
     let left_out = |(group, members): (Group, Vec<usize>)| fitted.without(group, &members, kept);
     groups.into_iter().filter_map(left_out).collect()
 }
@@ -164,7 +164,7 @@ impl Fitted<'_> {
 }
 
 /// Groups and their rows, indices into `rows`; a kind that parts the rows as one before it does is not taken.
-fn groups(dataset: &Dataset, kept: &[usize], rows: &[&PoseRow], configurations: &[usize]) -> Vec<(Group, Vec<usize>)> {
+fn groups(kept: &[usize], rows: &[&PoseRow], configurations: &[usize]) -> Vec<(Group, Vec<usize>)> {
     /// Bars whose lengths differ by less are one.
     const SAME_M: f64 = 1e-6;
     let all = |of: &dyn Fn(&PoseRow) -> Option<Group>| -> Option<Vec<Group>> { rows.iter().map(|&row| of(row)).collect() };
@@ -182,9 +182,9 @@ fn groups(dataset: &Dataset, kept: &[usize], rows: &[&PoseRow], configurations: 
         all(&|row| row.set.clone().map(Group::Set)),
         all(&|row| Some(Group::Place(row.file))),
         all(&|row| Some(Group::Pairing(row.pairing))),
-        Some(block_of.iter().map(|&block| ends[block].clone()).collect()),
+        // Configurations that were come back to make no blocks.
+        block_of.is_sorted().then(|| block_of.iter().map(|&block| ends[block].clone()).collect()),
     ];
-    debug_assert!(kept.iter().all(|&row| row < dataset.rows.len()));
     let mut seen: Vec<Vec<Vec<usize>>> = Vec::new();
     let mut groups = Vec::new();
     for kind in kinds.into_iter().flatten() {
