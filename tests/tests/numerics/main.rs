@@ -21,3 +21,5 @@ mod robots;
 mod scores;
 mod stored;
 mod unknowns;
+mod wrong_data;
+mod wrong_rows;

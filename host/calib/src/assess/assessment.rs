@@ -4,11 +4,12 @@ use super::by_group::{GroupProofs, by_group};
 use super::causes::{Cause, CauseKind, FittedRows, causes};
 use super::evidence::Evidence;
 use super::order::{Order, by_pairing, offset, trend};
+use super::plausibility::large_changes_of;
 use super::proof::{Proof, decisive, proofs};
 use super::reach::narrow_joints;
 use super::refusals::{Judged, Refusal, RmsLimit, judge};
 use super::reservations::{Grounds, reservations, sentence};
-use super::suspicion::{Suspicion, suspect};
+use super::suspicion::{Suspicion, suspect, suspect_moved};
 use crate::identify::{AndersonDarling, Offset, Residual, Trend, anderson_darling, residuals};
 use crate::model::Robot;
 
@@ -131,9 +132,19 @@ impl Assessment {
             normality: anderson_darling(&whitened_m),
             order,
         };
-        match judge(evidence, rms_limit, &assessment.proofs, &assessment.by_group) {
+        let (judged, mistake) = match judge(evidence, rms_limit, &assessment.proofs, &assessment.by_group) {
+            Judged::Better => match suspect_moved(evidence) {
+                Some(mistake) => {
+                    let changes = large_changes_of(&robot.chain, fit);
+                    (Judged::Refused(vec![Refusal::Mistaken(changes)]), Some(mistake))
+                }
+                None => (Judged::Better, None),
+            },
+            other => (other, None),
+        };
+        match judged {
             Judged::Refused(refusals) => {
-                assessment.suspicion = suspect(evidence, &refusals);
+                assessment.suspicion = mistake.or_else(|| suspect(evidence, &refusals));
                 assessment.reasons.extend(refusals.iter().map(Refusal::to_string));
                 let first = assessment.suspicion.as_ref().map(Suspicion::to_string);
                 let cause = first.or_else(|| assessment.likeliest_cause());

@@ -83,6 +83,9 @@ pub(super) fn by_group(evidence: &Evidence<'_>, before: &[Residual]) -> Vec<Grou
     kinds
 }
 
+/// Of groups that are predicted as well as noise allows, one in twenty is off by more.
+const BEYOND_NOISE: f64 = 0.05;
+
 fn group_proof(evidence: &Evidence<'_>, before: &[Residual], left_out: &LeftOutGroup) -> GroupProof {
     let Evidence { robot, dataset, fit, .. } = evidence;
     let LeftOutGroup { rows, residuals, expected_m, shares_configurations, p_value, .. } = left_out;
@@ -111,7 +114,8 @@ fn group_proof(evidence: &Evidence<'_>, before: &[Residual], left_out: &LeftOutG
         expected_m: *expected_m,
         shares_configurations: *shares_configurations,
         is_unlike: after_m > MUCH_WORSE * usual_m && usual.is_worse_by(SURELY) && *p_value < chance,
-        speaks_against: !shares_configurations && is_told && by_design.is_worse_by(SURELY),
+        // What lies within its own noise speaks against nothing, however well the design does.
+        speaks_against: !shares_configurations && is_told && *p_value < BEYOND_NOISE && by_design.is_worse_by(SURELY),
     }
 }
 

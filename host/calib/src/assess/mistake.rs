@@ -8,7 +8,7 @@ use ballbar::{JointKind, Measurement};
 
 use super::evidence::Evidence;
 use crate::identify::{median, residuals};
-use crate::model::{NamedPoint, PairingId, PoseRow};
+use crate::model::{End, NamedPoint, PairingId, PoseRow};
 use crate::units::{fixed, mm_from_m};
 
 /// One mistake, of all rows alike.
@@ -34,6 +34,8 @@ enum Remedy {
     Chucks(Vec<usize>),
     /// The sphere that each name stands for, by index.
     Spheres(Vec<usize>),
+    /// The other sign of a coordinate (0 to 2) of all chucks, or of all spheres.
+    Mirrored { end: End, axis: usize },
     /// Each other's values, by index.
     Joints(usize, usize),
     /// The other sign, by index.
@@ -61,6 +63,8 @@ impl Mistake {
             match &self.remedy {
                 Remedy::Chucks(stands_for) => right = of_pairing(row, stands_for[chuck], sphere),
                 Remedy::Spheres(stands_for) => right = of_pairing(row, chuck, stands_for[sphere]),
+                Remedy::Mirrored { end: End::Chuck, axis } => right.pairing.chuck_base_m[*axis] *= -1.0,
+                Remedy::Mirrored { end: End::Sphere, axis } => right.pairing.sphere_tool_m[*axis] *= -1.0,
                 Remedy::Joints(a, b) => right.q.as_array_mut().swap(*a, *b),
                 Remedy::Sign(joint) => right.q.as_array_mut()[*joint] *= -1.0,
                 Remedy::Units { angle, slide, length } => {
@@ -100,6 +104,12 @@ pub(super) fn conceivable(evidence: &Evidence<'_>) -> Vec<Mistake> {
                 remedy: Remedy::Joints(i, j),
             }),
         );
+    }
+    for (end, what) in [(End::Chuck, "chucks"), (End::Sphere, "spheres")] {
+        mistakes.extend(["x", "y", "z"].into_iter().enumerate().map(|(axis, name)| Mistake {
+            words: format!("all {what} look mirrored: their {name} has the wrong sign"),
+            remedy: Remedy::Mirrored { end, axis },
+        }));
     }
     mistakes.extend(units(kinds));
     for (by, which) in [(1, "next"), (-1, "previous")] {

@@ -107,6 +107,19 @@ fn changes_since(as_written: &Chain<f64>, design: &Chain<f64>, fitted: &Chain<f6
     changes
 }
 
+/// How far a fit says that a robot stands, or its tool is mounted, from where its file says, in units of what is remarkable: the larger of both.
+pub(super) fn change_of_ends(design: &Chain<f64>, fitted: &Chain<f64>) -> f64 {
+    let frames = CanonicalFrames::new(design);
+    let (design, fitted) = (frames.chain(), &frames.in_canonical_frames(fitted));
+    let last = design.joints();
+    let change = |i: usize| {
+        let (before, after) = design.link(i).zip(fitted.link(i))?;
+        let displacement = (after.translation_m - before.translation_m).norm() / ENDS.displacement_m.0;
+        Some(displacement.max(rotation(&before).angle_to(&rotation(&after)) / ENDS.rotation_rad.0))
+    };
+    [0, last].into_iter().filter_map(change).fold(0.0, f64::max)
+}
+
 fn links(chain: &Chain<f64>) -> impl Iterator<Item = Link<f64>> + '_ {
     (0..=chain.joints()).filter_map(|i| chain.link(i))
 }

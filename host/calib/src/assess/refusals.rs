@@ -98,6 +98,8 @@ pub enum Refusal {
     },
     /// Parameters went where no robot's are.
     Implausible(Vec<Change>),
+    /// The robot would stand, or its tool be mounted, far from where its file says, and a mistake in the measurements explains them as well.
+    Mistaken(Vec<Change>),
 }
 
 impl fmt::Display for Refusal {
@@ -143,6 +145,11 @@ impl fmt::Display for Refusal {
                 f,
                 "{}: no such robot exists. These poses do not tell its parameters, or the robot's file is another robot's, or says wrongly where it \
                  stands or what tool it has.",
+                moved(changes)
+            ),
+            Self::Mistaken(changes) => write!(
+                f,
+                "{}: far more than designs are off, and a mistake in the measurements explains them without that.",
                 moved(changes)
             ),
         }

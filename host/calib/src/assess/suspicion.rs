@@ -6,7 +6,7 @@ use ballbar::{Chain, FreeParameters, Kinematics, LmOptions, Measurement, Paramet
 
 use super::evidence::Evidence;
 use super::mistake::{Mistake, any_constant, conceivable};
-use super::plausibility::large_changes;
+use super::plausibility::{change_of_ends, large_changes};
 use super::refusals::Refusal;
 use crate::identify::{Finding, solve_lengths};
 use crate::kinematics::CanonicalFrames;
@@ -81,28 +81,57 @@ pub(super) fn suspect(evidence: &Evidence<'_>, refusals: &[Refusal]) -> Option<S
     }
     let trial = Trial::new(evidence);
     let as_they_are = dataset.measurements();
-    let (rms_m, is_plausible) = trial.fit(&as_they_are)?;
+    let Tried { rms_m, is_plausible, .. } = trial.fit(&as_they_are)?;
     // Where the parameters went too far to be believed, others that fit no better may still be the right ones.
     let is_far = is_implausible || !is_plausible;
     let most_m = if is_far { ALIKE * rms_m.max(SCATTER_M) } else { rms_m / FAR_BETTER };
     let most_m = if is_too_large { most_m.min(fit.fitted.rms_m / FAR_BETTER) } else { most_m };
     let explains = |mistake: Mistake| {
         let right = mistake.put_right(evidence);
-        let (rms_m, is_plausible) = trial.fit(&right).filter(|_| right != as_they_are)?;
+        let Tried { rms_m, is_plausible, .. } = trial.fit(&right).filter(|_| right != as_they_are)?;
         (is_plausible && rms_m < most_m).then_some((mistake, rms_m))
     };
     let mut found: Vec<(Mistake, f64)> = conceivable(evidence).into_iter().filter_map(explains).collect();
     if found.is_empty() {
         found.extend(any_constant(evidence).and_then(explains));
     }
-    if let Some(best_m) = found.iter().map(|(_, rms_m)| *rms_m).min_by(f64::total_cmp) {
-        found.retain(|(_, rms_m)| *rms_m <= ALIKE * best_m.max(SCATTER_M));
-        found.truncate(NAMED);
-        return Some(Suspicion::Mistakes { found, rms_m: fit.fitted.rms_m });
+    let named = likeliest(found, fit.fitted.rms_m);
+    if named.is_some() {
+        return named;
     }
     let strange_m = strange_m(evidence, &as_they_are);
     let is_unrelated = is_too_large && !is_beyond_limits && rms_m > UNRELATED * strange_m;
     is_unrelated.then_some(Suspicion::Unrelated { rms_m: fit.fitted.rms_m, strange_m })
+}
+
+/// Looks for a mistake where a fit is good but says that the robot stands, or its tool is mounted, far from where its file says: put right, it leaves
+/// them where they were, and fits as well. `None` where there is none, or nothing moved.
+pub(super) fn suspect_moved(evidence: &Evidence<'_>) -> Option<Suspicion> {
+    /// Of how far they are, what may be left: less is no chance.
+    const LEFT: f64 = 0.1;
+    let Evidence { robot, dataset, fit, .. } = evidence;
+    let moved = change_of_ends(&robot.chain, &fit.solution.chain);
+    if moved < 1.0 {
+        return None;
+    }
+    let trial = Trial::new(evidence);
+    let most_m = ALIKE * fit.fitted.rms_m.max(SCATTER_M);
+    let as_they_are = dataset.measurements();
+    let explains = |mistake: Mistake| {
+        let right = mistake.put_right(evidence);
+        let tried = trial.fit(&right).filter(|_| right != as_they_are)?;
+        let is_it = tried.is_plausible && tried.change_of_ends < LEFT * moved && tried.rms_m < most_m;
+        is_it.then_some((mistake, tried.rms_m))
+    };
+    likeliest(conceivable(evidence).into_iter().filter_map(explains).collect(), fit.fitted.rms_m)
+}
+
+/// Those that fit best; `None` of none.
+fn likeliest(mut found: Vec<(Mistake, f64)>, rms_m: f64) -> Option<Suspicion> {
+    let best_m = found.iter().map(|(_, rms_m)| *rms_m).min_by(f64::total_cmp)?;
+    found.retain(|(_, rms_m)| *rms_m <= ALIKE * best_m.max(SCATTER_M));
+    found.truncate(NAMED);
+    Some(Suspicion::Mistakes { found, rms_m })
 }
 
 /// A fit that leaves more than this share of what lengths of other poses would leave has learned nothing from the joints.
@@ -130,6 +159,16 @@ struct Trial {
     options: LmOptions,
 }
 
+/// What came of a quick fit.
+struct Tried {
+    /// RMS residual, metres.
+    rms_m: f64,
+    /// Whether its parameters are a robot's.
+    is_plausible: bool,
+    /// As [`change_of_ends`] has it.
+    change_of_ends: f64,
+}
+
 impl Trial {
     /// A design is a good start: what has not come near in so many steps is not the right one.
     const STEPS: usize = 20;
@@ -147,8 +186,8 @@ impl Trial {
         Self { design, free, options: LmOptions { max_iterations: Self::STEPS, ..LmOptions::default() } }
     }
 
-    /// The RMS residual of a fit, metres, and whether its parameters are a robot's; `None` where nothing can be fitted.
-    fn fit(&self, measurements: &[Measurement<f64>]) -> Option<(f64, bool)> {
+    /// `None` where nothing can be fitted.
+    fn fit(&self, measurements: &[Measurement<f64>]) -> Option<Tried> {
         let rows = self.rows(measurements);
         if rows.len() <= self.free.len() {
             return None;
@@ -158,7 +197,8 @@ impl Trial {
         let weight: f64 = rows.iter().map(|row| row.weight).sum();
         let squares: f64 = rows.iter().map(|row| row.weight * kinematics.residual(row).powi(2)).sum();
         let is_plausible = large_changes(&self.design, &fitted).iter().all(|change| !change.is_impossible);
-        Some(((squares / weight).sqrt(), is_plausible)).filter(|(rms_m, _)| rms_m.is_finite())
+        let change_of_ends = change_of_ends(&self.design, &fitted);
+        Some(Tried { rms_m: (squares / weight).sqrt(), is_plausible, change_of_ends }).filter(|tried| tried.rms_m.is_finite())
     }
 
     /// Enough rows to tell, evenly chosen; all where there are few.

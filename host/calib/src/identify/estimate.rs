@@ -167,6 +167,11 @@ impl Estimator<'_> {
         solve(&Objective { unknowns: self.unknowns, rows, beliefs, sigma_m }, &self.lm)
     }
 
+    /// Whether the solve came to nothing: no rows of a robot lead there, and none will be found among them.
+    pub(super) fn is_hopeless(&self, rows: &[&PoseRow], estimate: &Estimate) -> bool {
+        !estimate.solution.status.is_minimum() && self.rms_m(rows, estimate) > HOPELESS_M
+    }
+
     fn rms_m(&self, rows: &[&PoseRow], estimate: &Estimate) -> f64 {
         let residuals = Residual::of_rows(self.unknowns, &estimate.solution.values, rows.iter().copied());
         ResidualSummary::new(&residuals).rms_m

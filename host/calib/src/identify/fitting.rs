@@ -182,7 +182,8 @@ fn fit_as_written(
     let mut kept = kept_rows(&all_rows, &wrong_rows);
     let stated_m = estimator.stated_m.filter(|_| chain_prior.is_some());
     let mut uncertainty = estimate.uncertainty(&unknowns, &kept, stated_m, stated_m);
-    if let Some(seen_m) = uncertainty.beyond_stated_m(estimator.stated_m).filter(|_| chain_prior.is_some()) {
+    let is_hopeless = estimator.is_hopeless(&kept, &estimate);
+    if let Some(seen_m) = uncertainty.beyond_stated_m(estimator.stated_m).filter(|_| chain_prior.is_some() && !is_hopeless) {
         // What the rows state is not what they do: beliefs are weighed against what they do.
         estimator.stated_m = Some(seen_m);
         (estimate, wrong_rows) = estimated(&estimator, &all_rows, &start, options.loss);
@@ -207,7 +208,7 @@ fn fit_as_written(
     let base_alone = base_alone(&objective, &reasons, &lm).map(|values| ResidualSummary::new(&residuals_at(&values)));
     let neighbour_correlation = neighbour_correlation(dataset, &after);
     let in_blocks = neighbour_correlation.is_some_and(|correlation| correlation > ALIKE);
-    let (cross_validation, of_kept) = cross_validate(&objective, &lm, in_blocks).unzip();
+    let (cross_validation, of_kept) = (!is_hopeless).then(|| cross_validate(&objective, &lm, in_blocks)).flatten().unzip();
     let left_out = of_kept.map_or_else(Vec::new, |of_kept| {
         let mut left_out = after.clone();
         let kept = (0..left_out.len()).filter(|&row| !is_wrong(row)).collect::<Vec<_>>();

@@ -34,37 +34,82 @@ pub struct WrongRow {
 
 /// Of a thousand clean datasets one loses a row.
 const FALSE_ALARMS: f64 = 1e-3;
+/// Fewer degrees of freedom tell no deviation.
+const FEW: f64 = 3.0;
 /// Below it residuals are the rounding of a file's digits, and nothing stands out.
 const LEAST_SIGMA_M: f64 = 1e-9;
 
 /// Estimates from the rows that no others contradict; which were left out, ascending.
+///
+/// Among few rows some wrong ones can be met by all parameters together, so that good ones look wrong. So where rows are left out, or the others
+/// deviate by more than lengths do, a second start holds the robot nearer its design for as long as the rows look wild, and the likelier end counts.
 pub(super) fn estimate_robustly(estimator: &Estimator<'_>, rows: &[&PoseRow], start: &Beliefs) -> (Estimate, Vec<WrongRow>) {
-    /// Each round looks at all rows anew; what goes round in circles by then stays out.
+    let first = settled(estimator, rows, without_weight(estimator, rows, start, Trust::Rows));
+    if estimator.is_hopeless(rows, &first.estimate) || !first.is_doubtful(estimator) {
+        return (first.estimate, first.wrong);
+    }
+    let second = settled(estimator, rows, without_weight(estimator, rows, start, Trust::Design));
+    let best = if second.log_likelihood(rows.len()) > first.log_likelihood(rows.len()) { second } else { first };
+    (best.estimate, best.wrong)
+}
+
+/// An estimate from rows that agree, and what was left out.
+struct Settled {
+    estimate: Estimate,
+    wrong: Vec<WrongRow>,
+    /// Deviation of the rows that were kept, metres.
+    seen_m: f64,
+}
+
+impl Settled {
+    /// Whether another start may end better.
+    fn is_doubtful(&self, estimator: &Estimator<'_>) -> bool {
+        /// Rows that deviate by more than so many times what is stated or usual may be good ones and wrong ones mixed.
+        const TIMES: f64 = 10.0;
+        !self.wrong.is_empty() || self.seen_m > TIMES * estimator.stated_m.unwrap_or(estimator.usual_m)
+    }
+
+    /// Of all rows: those kept are normal, a wrong one is off by anything from a tenth of a millimetre to a metre, each factor of e alike.
+    fn log_likelihood(&self, rows: usize) -> f64 {
+        const FACTORS: f64 = 9.2;
+        let kept = (rows - self.wrong.len()) as f64;
+        let of_wrong = |wrong: &WrongRow| (2.0 * FACTORS * wrong.residual_m.abs().max(self.seen_m)).ln();
+        -kept * (self.seen_m.ln() + 0.5 * (std::f64::consts::TAU.ln() + 1.0)) - self.wrong.iter().map(of_wrong).sum::<f64>()
+    }
+}
+
+/// Leaves out these rows, and then others for as long as that changes what stands out.
+fn settled(estimator: &Estimator<'_>, rows: &[&PoseRow], mut out: Vec<usize>) -> Settled {
     const ROUNDS: usize = 10;
-    let mut out = without_weight(estimator, rows, start);
-    for round in 1.. {
+    for round in 0.. {
         let is_out = |row: usize| out.binary_search(&row).is_ok();
         let kept: Vec<usize> = (0..rows.len()).filter(|&row| !is_out(row)).collect();
         let of_kept: Vec<&PoseRow> = kept.iter().map(|&row| rows[row]).collect();
         let estimate = estimator.estimate(&of_kept);
-        let found = standing_out(estimator, rows, &kept, &estimate);
-        let next: Vec<usize> = found.iter().map(|wrong| wrong.row).collect();
-        if next == out {
-            return (estimate, found);
+        let Studentised { all, most, seen_m } = Studentised::new(estimator, rows, &kept, &estimate);
+        let next: Vec<usize> = all.iter().filter(|row| row.deviations.abs() > most).map(|wrong| wrong.row).collect();
+        let is_over = round > ROUNDS || round > 0 && estimator.is_hopeless(&of_kept, &estimate);
+        if next == out || is_over {
+            return Settled { estimate, wrong: out.iter().map(|&row| all[row]).collect(), seen_m };
         }
-        if round == ROUNDS {
-            let still = studentised(estimator, rows, &kept, &estimate).0;
-            return (estimate, out.iter().map(|&row| still[row]).collect());
-        }
-        out = next;
+        // What goes round in circles is wrong only where it is so seen from both sides.
+        out = if round < ROUNDS { next } else { next.into_iter().filter(|&row| is_out(row)).collect() };
     }
     unreachable!("the last round returns")
 }
 
+/// What decides while rows look wild.
+#[derive(Clone, Copy, PartialEq)]
+enum Trust {
+    /// Beliefs are weighed as beside good rows.
+    Rows,
+    /// They are weighed as beside rows that deviate as these do.
+    Design,
+}
+
 /// The rows that Tukey's biweight (A. E. Beaton and J. W. Tukey, Technometrics 16, 1974) gives no weight, from a start by Huber's (P. J. Huber, Annals
-/// of Mathematical Statistics 35, 1964), which has one minimum only near a design. Beliefs are weighed as beside good rows: however wild the rows
-/// look in the beginning, it is they that are to decide.
-fn without_weight(estimator: &Estimator<'_>, rows: &[&PoseRow], beliefs: &Beliefs) -> Vec<usize> {
+/// of Mathematical Statistics 35, 1964), which has one minimum only near a design.
+fn without_weight(estimator: &Estimator<'_>, rows: &[&PoseRow], beliefs: &Beliefs, trust: Trust) -> Vec<usize> {
     const HUBER: f64 = 1.345;
     const TUKEY: f64 = 4.685;
     const STEPS_OF_HUBER: usize = 12;
@@ -101,6 +146,7 @@ fn without_weight(estimator: &Estimator<'_>, rows: &[&PoseRow], beliefs: &Belief
             weighted.measurement.weight = row.measurement.weight * weight;
         }
         let rows: Vec<&PoseRow> = weighted.iter().collect();
+        let sigma_m = if trust == Trust::Rows { sigma_m } else { scale_m.max(sigma_m) };
         let objective = Objective { unknowns, rows: &rows, beliefs, sigma_m };
         let mut solution = solve_from(&objective, values.clone(), &steps(1));
         if solution.steps() == 0 {
@@ -109,7 +155,9 @@ fn without_weight(estimator: &Estimator<'_>, rows: &[&PoseRow], beliefs: &Belief
         }
         values = solution.values;
     }
-    (0..rows.len()).filter(|&row| weights[row] == 0.0).collect()
+    let without: Vec<usize> = (0..rows.len()).filter(|&row| weights[row] == 0.0).collect();
+    // Where every other contradicts the rest, there is no rest.
+    if 2 * without.len() >= rows.len() { Vec::new() } else { without }
 }
 
 /// Robust standard deviation: of the sizes, so many smallest of which the fit has brought to nothing, the median.
@@ -120,43 +168,51 @@ fn scale_m(whitened_m: &[f64], spent: usize) -> f64 {
     OF_NORMAL * median(sizes.split_off(spent))
 }
 
-/// Rows whose studentised residual is larger than chance makes one of so many, ascending.
-fn standing_out(estimator: &Estimator<'_>, rows: &[&PoseRow], kept: &[usize], estimate: &Estimate) -> Vec<WrongRow> {
-    let (all, most) = studentised(estimator, rows, kept, estimate);
-    all.into_iter().filter(|row| row.deviations.abs() > most).collect()
+/// Studentised residuals of all rows: of rows that were fitted by what is left without them ("externally" studentised: R. D. Cook and S. Weisberg,
+/// "Residuals and Influence in Regression", 1982), of others by how well they are predicted.
+struct Studentised {
+    all: Vec<WrongRow>,
+    /// What is larger than chance makes one of so many, in standard deviations.
+    most: f64,
+    /// Deviation of the rows that were kept, metres.
+    seen_m: f64,
 }
 
-/// Studentised residuals of all rows, and beyond what they stand out. Of rows that were fitted by what is left without them ("externally"
-/// studentised: R. D. Cook and S. Weisberg, "Residuals and Influence in Regression", 1982), of others by how well they are predicted.
-fn studentised(estimator: &Estimator<'_>, rows: &[&PoseRow], kept: &[usize], estimate: &Estimate) -> (Vec<WrongRow>, f64) {
-    let Estimator { unknowns, stated_m, .. } = *estimator;
-    let values = &estimate.solution.values;
-    let leverage = leverages(unknowns, rows, kept, estimate);
-    let residuals = Residual::of_rows(unknowns, values, rows.iter().copied());
-    let square_m2: f64 = kept.iter().map(|&row| residuals[row].whitened_m().powi(2)).sum();
-    let told: f64 = kept.iter().map(|&row| leverage[row]).sum();
-    let freedom = (kept.len() as f64 - told - 1.0).max(1.0);
-    const MET: f64 = 1.0 - 1e-6;
-    let floor_m = stated_m.unwrap_or_default().max(LEAST_SIGMA_M);
-    let mut is_kept = vec![false; rows.len()];
-    kept.iter().for_each(|&row| is_kept[row] = true);
-    let studentise = |row: usize| {
-        let (whitened_m, leverage) = (residuals[row].whitened_m(), leverage[row]);
-        let (own_m2, spread) = if is_kept[row] {
-            // A row that is met whatever it says cannot be told to be wrong.
-            let left = if leverage < MET { 1.0 - leverage } else { f64::INFINITY };
-            (whitened_m * whitened_m / left, left)
-        } else {
-            (0.0, 1.0 + leverage)
+impl Studentised {
+    fn new(estimator: &Estimator<'_>, rows: &[&PoseRow], kept: &[usize], estimate: &Estimate) -> Self {
+        let Estimator { unknowns, stated_m, .. } = *estimator;
+        let values = &estimate.solution.values;
+        let leverage = leverages(unknowns, rows, kept, estimate);
+        let residuals = Residual::of_rows(unknowns, values, rows.iter().copied());
+        let square_m2: f64 = kept.iter().map(|&row| residuals[row].whitened_m().powi(2)).sum();
+        let told: f64 = kept.iter().map(|&row| leverage[row]).sum();
+        let freedom = kept.len() as f64 - told - 1.0;
+        // Residuals that are nearly all met say nothing of what lengths deviate by: what the estimate weighed them with does.
+        let is_nearly_met = freedom < FEW;
+        let freedom = if is_nearly_met { (kept.len() as f64 - 1.0).max(1.0) } else { freedom };
+        const MET: f64 = 1.0 - 1e-6;
+        let floor_m = stated_m.or(is_nearly_met.then_some(estimate.sigma_m)).unwrap_or_default().max(LEAST_SIGMA_M);
+        let mut is_kept = vec![false; rows.len()];
+        kept.iter().for_each(|&row| is_kept[row] = true);
+        let studentise = |row: usize| {
+            let (whitened_m, leverage) = (residuals[row].whitened_m(), leverage[row]);
+            let (own_m2, spread) = if is_kept[row] {
+                // A row that is met whatever it says cannot be told to be wrong.
+                let left = if leverage < MET { 1.0 - leverage } else { f64::INFINITY };
+                (whitened_m * whitened_m / left, left)
+            } else {
+                (0.0, 1.0 + leverage)
+            };
+            let freedom = if is_kept[row] { freedom } else { freedom + 1.0 };
+            let seen_m = ((square_m2 - own_m2).max(0.0) / freedom).sqrt();
+            let deviations = whitened_m / (seen_m.max(floor_m) * spread.sqrt());
+            WrongRow { row, residual_m: residuals[row].value_m, deviations }
         };
-        let freedom = if is_kept[row] { freedom } else { freedom + 1.0 };
-        let seen_m = ((square_m2 - own_m2).max(0.0) / freedom).sqrt();
-        let deviations = whitened_m / (seen_m.max(floor_m) * spread.sqrt());
-        WrongRow { row, residual_m: residuals[row].value_m, deviations }
-    };
-    let chance = FALSE_ALARMS / rows.len() as f64;
-    let most = StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - chance / 2.0));
-    ((0..rows.len()).map(studentise).collect(), most)
+        let chance = FALSE_ALARMS / rows.len() as f64;
+        let most = StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - chance / 2.0));
+        let seen_m = (square_m2 / (freedom + 1.0)).sqrt().max(floor_m);
+        Self { all: (0..rows.len()).map(studentise).collect(), most, seen_m }
+    }
 }
 
 /// `w J (JᵀWJ + σ²Λ)⁻¹ Jᵀ` of each row, the inverse by the rows that were kept.
