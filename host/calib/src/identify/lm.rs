@@ -64,7 +64,7 @@ pub(super) fn solve_from(objective: &Objective<'_>, from: Vec<f64>, options: &Lm
     Solution { status, chain: objective.unknowns.chain(&values), values, rms_history_m }
 }
 
-/// Minimises `Σ w (d_measured − d_computed)²` over some parameters of a chain, where nothing else is unknown; as [`solve`].
+/// Minimises `Σ w (d_measured − d_computed)²` over some parameters of a chain, where nothing else is unknown and nothing is believed.
 pub fn solve_lengths(
     chain: &Chain<f64>,
     measurements: &[Measurement<f64>],
