@@ -76,15 +76,19 @@ fn changes_that_no_robot_has_are_refused_and_those_of_a_base_set_down_elsewhere_
     elsewhere.chain.parameters_mut()[0] += 0.2;
     let near = assess(&elsewhere, &cell.rig, &good, Hold::paper());
     assert_eq!(near.answer, Answer::Reserved, "{:?}", near.reasons);
-    assert!(near.reasons.join(" ").to_lowercase().contains("does the robot stand"), "{:?}", near.reasons);
+    assert!(near.reasons.join(" ").contains("link 1, where the robot stands, by "), "{:?}", near.reasons);
 
     // An arm of another length: the fit finds it, and does not believe it.
     let mut other_arm = cell.design.clone();
     other_arm.chain.parameters_mut()[16] += 0.15;
-    let other = assess(&other_arm, &cell.rig, &good, Hold::paper());
+    let plain = fit(&other_arm, &good, &FitOptions { hold: Hold::paper(), ..FitOptions::plain() }).expect("enough poses");
+    let other = Assessment::new(&Evidence::new(&other_arm, &cell.rig, &good, &plain));
     assert_eq!(other.answer, Answer::NotTrusted, "{:?}", other.reasons);
-    let said = other.reasons.join(" ");
-    assert!(said.contains("no such robot exists") || said.contains("do not belong together"), "{said}");
+    assert!(other.reasons.join(" ").contains("no such robot exists"), "{:?}", other.reasons);
+    // Tolerances do not let it find one.
+    let held_back = assess(&other_arm, &cell.rig, &good, Hold::paper());
+    assert_eq!(held_back.answer, Answer::NotTrusted, "{:?}", held_back.reasons);
+    assert!(held_back.reasons.join(" ").contains("do not belong together"), "{:?}", held_back.reasons);
 }
 
 #[test]

@@ -276,7 +276,7 @@ fn what_a_robot_that_stands_elsewhere_explains_may_be_a_mistake() {
     assert_eq!(told.answer, Answer::NotTrusted, "{:?}", told.reasons);
     assert!(told.reasons.last().is_some_and(|last| last.contains("all chucks look mirrored: their z")), "{:?}", told.reasons);
 
-    for (parameter, by) in [(0, 0.2), (1, -0.15), (3, 0.3)] {
+    for (parameter, by) in [(0, 0.2), (1, -0.15), (3, 0.3), (50, 0.13), (51, 0.4)] {
         let design = cell.design.clone();
         cell.design.chain.parameters_mut()[parameter] += by;
         let told = assess(&cell, &good);

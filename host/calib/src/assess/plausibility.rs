@@ -2,11 +2,10 @@
 
 use std::fmt;
 
-use ballbar::{Chain, JointKind, Link};
-use nalgebra::Rotation3;
+use ballbar::{Chain, JointKind, Link, Pose, Vector3};
 
 use crate::identify::Fit;
-use crate::kinematics::CanonicalFrames;
+use crate::kinematics::{CanonicalFrames, apart, compose, from_link, inverse};
 use crate::model::{Dataset, Robot};
 use crate::units::{ScreenUnit, fixed};
 
@@ -78,7 +77,7 @@ fn changes_since(as_written: &Chain<f64>, design: &Chain<f64>, fitted: &Chain<f6
             changes.push(Change { part, size, unit, is_impossible: is_beyond(impossible) });
         }
     };
-    for (i, (before, after)) in links(design).zip(links(fitted)).enumerate() {
+    for (i, (before, after)) in links_of_both(design, fitted).into_iter().enumerate() {
         let bounds = if i == 0 || i == joints { ENDS } else { INSIDE };
         let name = match i {
             0 => "link 1, where the robot stands,".to_owned(),
@@ -89,7 +88,7 @@ fn changes_since(as_written: &Chain<f64>, design: &Chain<f64>, fitted: &Chain<f6
         let (remarkable_m, impossible_m) = bounds.displacement_m;
         let displacement_m = (remarkable_m.max(longest_m), impossible_m.max(longest_m));
         judge(name.clone(), (after.translation_m - before.translation_m).norm(), ScreenUnit::Millimetre, displacement_m);
-        judge(name, rotation(&before).angle_to(&rotation(&after)), ScreenUnit::Degree, bounds.rotation_rad);
+        judge(name, apart(&before, &after).1, ScreenUnit::Degree, bounds.rotation_rad);
     }
     for i in 0..joints {
         let (Some(before), Some(after)) = (design.joint(i), fitted.joint(i)) else { continue };
@@ -111,21 +110,39 @@ fn changes_since(as_written: &Chain<f64>, design: &Chain<f64>, fitted: &Chain<f6
 pub(super) fn change_of_ends(design: &Chain<f64>, fitted: &Chain<f64>) -> f64 {
     let frames = CanonicalFrames::new(design);
     let (design, fitted) = (frames.chain(), &frames.in_canonical_frames(fitted));
-    let last = design.joints();
-    let change = |i: usize| {
-        let (before, after) = design.link(i).zip(fitted.link(i))?;
-        let displacement = (after.translation_m - before.translation_m).norm() / ENDS.displacement_m.0;
-        Some(displacement.max(rotation(&before).angle_to(&rotation(&after)) / ENDS.rotation_rad.0))
-    };
-    [0, last].into_iter().filter_map(change).fold(0.0, f64::max)
+    let links = links_of_both(design, fitted);
+    let ends = links.first().into_iter().chain(links.last());
+    let change = ends.map(|(before, after)| {
+        let (displacement_m, turn_rad) = apart(before, after);
+        (displacement_m / ENDS.displacement_m.0).max(turn_rad / ENDS.rotation_rad.0)
+    });
+    change.fold(0.0, f64::max)
 }
 
-fn links(chain: &Chain<f64>) -> impl Iterator<Item = Link<f64>> + '_ {
-    (0..=chain.joints()).filter_map(|i| chain.link(i))
+/// Each link in both chains, which are in one's canonical frames.
+///
+/// There the last joint's frame follows the tool along and about its axis (of a slide, wherever it is), so that a tool which is mounted elsewhere would
+/// look like a link of the arm that has changed: what the tool can do alone counts as its own.
+fn links_of_both(design: &Chain<f64>, fitted: &Chain<f64>) -> Vec<(Pose<f64>, Pose<f64>)> {
+    let links = |chain: &Chain<f64>| (0..=chain.joints()).filter_map(|i| chain.link(i)).map(pose).collect::<Vec<_>>();
+    let (before, mut after) = (links(design), links(fitted));
+    if let ([.., arm, _], [.., found_arm, found_tool]) = (before.as_slice(), after.as_mut_slice()) {
+        let moved = found_arm.rotation.tr_mul(&(found_arm.translation_m - arm.translation_m));
+        let moved = match fitted.joint_kinds().last() {
+            Some(JointKind::Prismatic) => moved,
+            _ => Vector3::new(0.0, 0.0, moved.z),
+        };
+        let turned = arm.rotation.tr_mul(&found_arm.rotation);
+        let turn_rad = (turned[(1, 0)] - turned[(0, 1)]).atan2(turned[(0, 0)] + turned[(1, 1)]);
+        let by_tool = compose(&from_link(Vector3::zeros(), [turn_rad, 0.0, 0.0]), &from_link(moved, [0.0; 3]));
+        *found_tool = compose(&by_tool, found_tool);
+        *found_arm = compose(found_arm, &inverse(&by_tool));
+    }
+    before.into_iter().zip(after).collect()
 }
 
-fn rotation(link: &Link<f64>) -> Rotation3<f64> {
-    Rotation3::from_euler_angles(link.gamma_rad, link.beta_rad, link.alpha_rad)
+fn pose(link: Link<f64>) -> Pose<f64> {
+    from_link(link.translation_m, [link.alpha_rad, link.beta_rad, link.gamma_rad])
 }
 
 /// Size of an angle, whole turns aside.
