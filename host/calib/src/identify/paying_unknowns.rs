@@ -1,7 +1,7 @@
 //! Which kinds of unknowns pay: forward selection by scores, each proved on poses left out.
 
 use super::fit::Fit;
-use super::fitting::FitError;
+use super::options::FitError;
 use super::postures::{mean_and_error, postures};
 use super::residual::Residual;
 use super::scores::{UnknownScore, unknown_scores};
@@ -78,9 +78,11 @@ fn tried(robot: &Robot, dataset: &Dataset, score: &UnknownScore, before: &Fit, w
     if before.left_out.len() != rows || with.left_out.len() != rows {
         return None;
     }
-    let square = |residual: &Residual| residual.weight * residual.value_m.powi(2);
+    // What only one of them has left out as wrong is no gain of the other.
+    let both = |row: usize| before.left_out[row].weight > 0.0 && with.left_out[row].weight > 0.0;
+    let square = |of: &[Residual], row: usize| if both(row) { of[row].weight * of[row].value_m.powi(2) } else { 0.0 };
     let of_rows = postures(robot.chain.joint_kinds(), dataset.rows.iter().map(|row| &row.measurement.q));
-    let (mean, error) = mean_and_error(&of_rows, |row| square(&before.left_out[row]) - square(&with.left_out[row]))?;
+    let (mean, error) = mean_and_error(&of_rows, |row| square(&before.left_out, row) - square(&with.left_out, row))?;
     let tried = TriedKind {
         kind: score.kind,
         score: score.clone(),
