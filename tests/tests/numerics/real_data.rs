@@ -70,6 +70,15 @@ fn a_cable_set_of_one_pairing_is_told_its_bounds_and_does_not_run_away() {
 }
 
 #[test]
+fn a_cable_set_is_refused_by_default_and_no_parameter_runs_away() {
+    let Some(run) = fit_json("robotcali_irb120", &[]) else { return };
+    assert_eq!(run.code, 1, "{}", run.stderr);
+    let fit = run.json();
+    assert_eq!(fit["verdict"], "not_trusted");
+    assert!(!fit["reasons"].to_string().contains("no such robot exists"), "{}", fit["reasons"]);
+}
+
+#[test]
 fn freeing_everything_on_the_cable_set_is_called_what_it_is() {
     let Some(run) = fit_json("robotcali_irb120", &["--hold", "none", "--prior", "none", "--loss", "none"]) else { return };
     let fit = run.json();
