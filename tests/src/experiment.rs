@@ -27,19 +27,9 @@ impl Default for Puma {
 impl Puma {
     /// Poses of all nine pairings on shells of one radius.
     pub fn shells(&self, radius_m: f64, per_pairing: usize, sigma_m: f64, seed: u64) -> Dataset {
-        let pairings = self.rig.all_pairings();
-        let shells = Shells {
-            planned_with: &self.design,
-            truth: &self.truth,
-            rig: &self.rig,
-            pairings: &pairings,
-            bar_m: radius_m,
-            per_pairing,
-            sigma_m,
-            seed,
-        };
-        let poses = shells.simulate(|| ()).expect("within reach");
-        dataset(poses.into_iter().map(|pose| pose.row).collect())
+        let Self { design, truth, rig } = self;
+        let cell = Cell { design: design.clone(), truth: truth.clone(), rig: rig.clone() };
+        cell.measured(radius_m, per_pairing, sigma_m, seed)
     }
 }
 

@@ -5,12 +5,11 @@ use ballbar_calib::assess::{Assessment, Evidence};
 use ballbar_calib::identify::{Fit, FitOptions, fit};
 use ballbar_calib::kinematics::CanonicalFrames;
 use ballbar_calib::model::{Dataset, JointLimits, NamedPoint, PairingId, PoseRow, Rig, Robot};
-use ballbar_calib::simulate::Shells;
 use ballbar_calib::unknowns::Kind;
 use ballbar_tests::at_length::at_length;
 use ballbar_tests::command::host_cal_in;
 use ballbar_tests::data::real_data;
-use ballbar_tests::experiment::dataset;
+use ballbar_tests::experiment::{Cell, Puma};
 use ballbar_tests::frames::{random_chain, rewritten};
 use ballbar_tests::plans::plausible_robot;
 use host_cal::files::{open_rig, open_robot, read_poses};
@@ -56,20 +55,11 @@ fn a_robot_in_far_and_turned_frames_is_fitted_as_it_is_in_its_own() {
         // A design that is not special, and what was built.
         let robot = Robot { chain: plausible_robot(&design.chain, &mut rng), ..design };
         let truth = Robot { chain: plausible_robot(&robot.chain, &mut rng), ..robot.clone() };
-        let shells = Shells {
-            planned_with: &robot,
-            truth: &truth,
-            rig: &rig,
-            pairings: &pairings,
-            bar_m: 0.46,
-            per_pairing,
-            sigma_m: 84e-6,
-            seed: i as u64,
-        };
-        let poses = dataset(shells.simulate(|| ()).unwrap().into_iter().map(|pose| pose.row).collect());
+        let cell = Cell { design: robot.clone(), truth, rig: rig.clone() };
+        let poses = cell.measured_at(&pairings, 0.46, per_pairing, 84e-6, i as u64);
         let other = Robot { chain: rewritten(&robot.chain, SLIDE_M, &mut rng), ..robot.clone() };
         let [(one, answer, reasons), (far, far_answer, far_reasons)] = fits([&robot, &other], &rig, &poses);
-        assert!(apart_m(&one.solution.chain, &truth.chain, &robot) < 5e-3, "{name}");
+        assert!(apart_m(&one.solution.chain, &cell.truth.chain, &robot) < 5e-3, "{name}");
         let off_m = apart_m(&one.solution.chain, &far.solution.chain, &robot);
         assert!(off_m < SAME_M, "{name}: {off_m} m");
         assert_eq!((answer, reasons), (far_answer, far_reasons), "{name}");
@@ -131,17 +121,8 @@ fn what_gravity_does_to_the_joints_is_the_same_in_all_frames() {
     }
     let mut truth = Robot { chain: plausible_robot(&design.chain, &mut rng), ..design.clone() };
     (0..6).for_each(|joint| truth.terms.set_coefficient(joint, TermKind::Compliance, RAD_PER_NM));
-    let shells = Shells {
-        planned_with: &design,
-        truth: &truth,
-        rig: &rig,
-        pairings: &rig.all_pairings(),
-        bar_m: 0.46,
-        per_pairing: 20,
-        sigma_m: 20e-6,
-        seed: 3,
-    };
-    let poses = dataset(shells.simulate(|| ()).unwrap().into_iter().map(|pose| pose.row).collect());
+    let cell = Cell { design: design.clone(), truth, rig };
+    let (poses, rig) = (cell.measured(0.46, 20, 20e-6, 3), &cell.rig);
     let chain = rewritten(&design.chain, 100.0, &mut rng);
     let mut far = Robot { chain, ..design.clone() };
     // The masses of the same robot, seen from its far frames: back by the way of the canonical ones.
@@ -159,7 +140,7 @@ fn what_gravity_does_to_the_joints_is_the_same_in_all_frames() {
         far.terms.masses.links[joint].center_m = turn.transpose() * (canonical.masses.links[joint].center_m - origin_m);
     }
     let found = [&design, &far].map(|robot| {
-        let unknowns = vec![Kind::Compliance.block(robot, &rig, &poses).unwrap()];
+        let unknowns = vec![Kind::Compliance.block(robot, rig, &poses).unwrap()];
         fit(robot, &poses, &FitOptions { unknowns, ..FitOptions::default() }).unwrap()
     });
     let robots = [found[0].robot(&design), found[1].robot(&far)];
@@ -186,19 +167,8 @@ fn what_gravity_does_to_the_joints_is_the_same_in_all_frames() {
 
 #[test]
 fn deviations_say_the_same_of_the_tool_in_all_frames() {
-    let rig = open_rig("triangles").unwrap();
-    let (design, truth) = (open_robot("puma560").unwrap(), open_robot("puma560-optimised").unwrap());
-    let shells = Shells {
-        planned_with: &design,
-        truth: &truth,
-        rig: &rig,
-        pairings: &rig.all_pairings(),
-        bar_m: 0.46,
-        per_pairing: 20,
-        sigma_m: 84e-6,
-        seed: 2,
-    };
-    let poses = dataset(shells.simulate(|| ()).unwrap().into_iter().map(|pose| pose.row).collect());
+    let puma = Puma::default();
+    let (poses, design) = (puma.shells(0.46, 20, 84e-6, 2), puma.design);
     let other = Robot { chain: rewritten(&design.chain, 0.5, &mut ChaCha8Rng::seed_from_u64(4)), ..design.clone() };
     // The standard deviation of the tool along x: J C Jᵀ by the fit's own parameters.
     let deviations_m = [&design, &other].map(|robot| {

@@ -6,10 +6,9 @@ use ballbar::{Chain, JointKind, Kinematics, Vector3};
 use ballbar_calib::assess::{Answer, Assessment, Evidence};
 use ballbar_calib::identify::{Fit, FitOptions, Hold, HoldRule, Part, fit};
 use ballbar_calib::model::{Dataset, LinkTolerance, PairingId, Rig, Robot};
-use ballbar_calib::simulate::Shells;
 use ballbar_tests::at_length::at_length;
 use ballbar_tests::data::real_data;
-use ballbar_tests::experiment::{Puma, dataset};
+use ballbar_tests::experiment::{Cell, Puma};
 use ballbar_tests::tool::{at_spheres_aligned_m, at_spheres_m};
 use host_cal::files::{open_rig, open_robot, read_poses};
 use rand::{RngExt, SeedableRng};
@@ -37,9 +36,8 @@ fn as_built(design: &Chain<f64>, seed: u64) -> Chain<f64> {
 
 /// Lengths of some pairings on the small shell.
 fn lengths(puma: &Puma, truth: &Robot, pairings: &[PairingId], per_pairing: usize, seed: u64) -> Dataset {
-    let shells =
-        Shells { planned_with: &puma.design, truth, rig: &puma.rig, pairings, bar_m: 0.46, per_pairing, sigma_m: SIGMA_M, seed };
-    dataset(shells.simulate(|| ()).unwrap().into_iter().map(|pose| pose.row).collect())
+    let cell = Cell { design: puma.design.clone(), truth: truth.clone(), rig: puma.rig.clone() };
+    cell.measured_at(pairings, 0.46, per_pairing, SIGMA_M, seed)
 }
 
 /// Errors at the spheres of the design and of a fit, metres, for many robots as they may be built.
