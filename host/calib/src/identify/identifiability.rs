@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::observation::Observation;
 use super::pivoting::PivotedColumns;
-use super::reference::{Reference, independent_columns};
+use super::reference::{Dependence, independent_columns};
 use super::spectrum::{Spectrum, is_zero_column};
 use crate::model::{Dataset, JointLimits, PoseRow, Robot};
 use crate::units::ScreenUnit;
@@ -131,7 +131,8 @@ impl Identifiability {
     /// parameters at the indices `held`, which are not free whatever the poses say.
     pub fn new(chain: &Chain<f64>, measurements: &[Measurement<f64>], limits: &[JointLimits], held: &[usize]) -> Self {
         let block = ChainBlock::new(chain.clone(), JointTerms::none());
-        Self::of(&block, &block.unknowns(), &Observation::new(chain, measurements), limits, held)
+        let dependence = Dependence::new(chain, limits);
+        Self::of(&block, &block.unknowns(), &Observation::new(chain, measurements), &dependence, held)
     }
 
     /// Judges all parameters of a robot, whose joints may have terms, by poses; as [`Identifiability::new`].
@@ -139,30 +140,26 @@ impl Identifiability {
         let unknowns = Unknowns::new(&robot.chain, &robot.terms, Vec::new());
         let rows: Vec<&PoseRow> = dataset.rows.iter().collect();
         let observation = Observation::of(&unknowns, &unknowns.start(), &rows, None);
-        Self::of(unknowns.of_chain(), unknowns.list(), &observation, &robot.limits, &[])
+        let dependence = Dependence::new(&robot.chain, &robot.limits);
+        Self::of(unknowns.of_chain(), unknowns.list(), &observation, &dependence, &[])
     }
 
-    /// Judges all unknowns, those of a chain and others behind them, by an observation of them all.
+    /// Judges all unknowns, those of a chain and others behind them, by an observation of them all and by what of the chain is always dependent.
     pub(super) fn of(
         chain: &ChainBlock,
         unknowns: &[Unknown],
         observation: &Observation,
-        limits: &[JointLimits],
+        dependence: &Dependence,
         held: &[usize],
     ) -> Self {
-        let groups = |held: &[usize]| {
-            let all = (0..unknowns.len()).filter(|index| !held.contains(index));
-            let (last, first): (Vec<usize>, Vec<usize>) = all.partition(|&index| chain.is_held_in_paper(index));
-            [first, last]
-        };
+        let all = (0..unknowns.len()).filter(|index| !held.contains(index));
+        let (last, first): (Vec<usize>, Vec<usize>) = all.partition(|&index| chain.is_held_in_paper(index));
         let names: Vec<String> = unknowns.iter().map(|unknown| unknown.name.clone()).collect();
         let spectrum = Spectrum::new(&observation.jacobian);
-        let independent = independent_columns(&groups(held), &observation.jacobian, spectrum.rank);
+        let independent = independent_columns(&[first, last], &observation.jacobian, spectrum.rank);
         let noise_m = unexplained_rms(observation, &independent);
 
-        let reference = Reference::new(chain.design(), limits).jacobian(chain.design());
-        let of_chain = groups(held).map(|group| group.into_iter().filter(|&index| index < chain.len()).collect());
-        let always_independent = independent_columns(&of_chain, &reference, Spectrum::new(&reference).rank);
+        let always_independent = dependence.independent(&[], held);
         let is_redundant = |index: usize| index < chain.len() && !always_independent.contains(&index);
         let called = |indices: Vec<usize>| indices.into_iter().map(|index| names[index].clone()).collect();
 
@@ -176,7 +173,7 @@ impl Identifiability {
             findings[index] = if held.contains(&index) {
                 Finding::LeftOut
             } else if is_redundant(index) {
-                Finding::Redundant { with: called(mimics(&reference, &always_independent, index)) }
+                Finding::Redundant { with: called(mimics(&dependence.jacobian, &always_independent, index)) }
             } else if is_zero_column(observation.jacobian.column(index).norm(), largest) {
                 Finding::NoEffect
             } else {

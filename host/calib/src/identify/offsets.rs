@@ -1,5 +1,7 @@
 //! Whether the mean residual of a pairing is farther from zero than chance takes it.
 
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
 use super::residual::{Residual, ResidualSummary};
 
 /// How far the mean of a group of residuals is from zero.
@@ -35,20 +37,9 @@ pub fn farthest_offset(groups: &[Vec<Residual>], sigma_m: f64, freedom: usize) -
     farthest.filter(|_| sigma_m > SMALLEST_SPREAD_M && freedom > 0)
 }
 
-/// Probability that Student's t is farther from zero than `t`, on either side. The series are finite and exact: Abramowitz and
-/// Stegun, "Handbook of Mathematical Functions" (1964), 26.7.3 and 26.7.4.
+/// Probability that Student's t is farther from zero than `t`, on either side; 1 without degrees of freedom.
 fn two_tails(t: f64, freedom: usize) -> f64 {
-    let (sin, cos) = (t / (freedom as f64).sqrt()).atan().sin_cos();
-    let is_odd = freedom % 2 == 1;
-    // Each term is the one before it times cos² and the ratio of the next even and odd numbers.
-    let (mut term, mut sum, mut power) = (if is_odd { cos } else { 1.0 }, 0.0, usize::from(is_odd));
-    while power + 2 <= freedom {
-        sum += term;
-        power += 2;
-        term *= cos * cos * (power - 1) as f64 / power as f64;
-    }
-    let within = if is_odd { std::f64::consts::FRAC_2_PI * (sin.atan2(cos) + sin * sum) } else { sin * sum };
-    1.0 - within
+    StudentsT::new(0.0, 1.0, freedom as f64).map_or(1.0, |students| 2.0 * students.sf(t))
 }
 
 #[cfg(test)]

@@ -12,11 +12,10 @@
 use std::fmt;
 use std::ops::Range;
 
-use ballbar::{Chain, JointKind, PARAMETERS_PER_JOINT, Parameter};
+use ballbar::{Chain, JointKind, PARAMETERS_PER_JOINT};
 use nalgebra::{DMatrix, DVector};
 
-use super::reference::{Reference, independent_columns};
-use super::spectrum::Spectrum;
+use super::reference::Dependence;
 use crate::kinematics::CanonicalFrames;
 use crate::model::{JointLimits, Tolerances};
 
@@ -93,17 +92,20 @@ const EXACT: f64 = 1e-7;
 const RELEASED: f64 = 1e3;
 
 impl ChainPrior {
-    /// Of a chain as it is written. A reference experiment says what of it is redundant.
-    pub(super) fn new(written: &Chain<f64>, tolerances: &Tolerances, limits: &[JointLimits]) -> Self {
+    /// Of a chain as it is written, of whose parameters `written_dependence` tells what is redundant.
+    pub(super) fn new(
+        written: &Chain<f64>,
+        written_dependence: &Dependence,
+        tolerances: &Tolerances,
+        limits: &[JointLimits],
+    ) -> Self {
         let frames = CanonicalFrames::new(written);
         let chain = frames.chain();
         let parts = parts(chain, tolerances);
-        let reference = Reference::new(chain, limits);
-        let jacobian = reference.jacobian(chain);
-        let of_written = if chain == written { jacobian.clone() } else { reference.jacobian(written) };
-        let is_last = |index: &usize| chain.is_conventionally_held(Parameter::from_index(*index));
-        let (last, first): (Vec<usize>, Vec<usize>) = (0..chain.parameter_count()).partition(is_last);
-        let independent = independent_columns(&[first, last], &jacobian, Spectrum::new(&jacobian).rank);
+        let own = (chain != written).then(|| Dependence::new(chain, limits));
+        let dependence = own.as_ref().unwrap_or(written_dependence);
+        let (jacobian, of_written) = (&dependence.jacobian, &written_dependence.jacobian);
+        let independent = dependence.independent(&[], &[]);
         let redundant: Vec<usize> = (0..chain.parameter_count()).filter(|index| !independent.contains(index)).collect();
         let qr = jacobian.select_columns(&independent).qr();
         let in_terms = |columns: &DMatrix<f64>| {
@@ -111,7 +113,7 @@ impl ChainPrior {
             by.unwrap_or_else(|| DMatrix::zeros(independent.len(), columns.ncols()))
         };
         let exchange = in_terms(&jacobian.select_columns(&redundant));
-        let independent_by_written = in_terms(&of_written);
+        let independent_by_written = in_terms(of_written);
         Self { parts, independent, redundant, exchange, independent_by_written }
     }
 

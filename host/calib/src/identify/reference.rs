@@ -1,23 +1,23 @@
 //! An experiment that excites whatever can be excited: what is dependent there is dependent in every experiment.
 
-use ballbar::{Chain, Kinematics, LANES, LengthRows, Measurement, Pairing, Vector3};
+use ballbar::{Chain, Kinematics, LANES, LengthRows, Measurement, Pairing, Parameter, Vector3};
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::pivoting::PivotedColumns;
-use super::spectrum::{RANK_THRESHOLD, column_scales};
+use super::spectrum::{RANK_THRESHOLD, Spectrum, column_scales};
 use crate::model::JointLimits;
 
 /// Random poses within the limits, random pairings of three chucks and three spheres.
 #[derive(Clone, Debug)]
-pub(super) struct Reference {
+struct Reference {
     measurements: Vec<Measurement<f64>>,
 }
 
 impl Reference {
     /// Of a chain: the same poses for every way to write it.
-    pub(super) fn new(chain: &Chain<f64>, limits: &[JointLimits]) -> Self {
+    fn new(chain: &Chain<f64>, limits: &[JointLimits]) -> Self {
         const ROWS_PER_PARAMETER: usize = 4;
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let mut point = |reach_m: f64| Vector3::from_fn(|_, _| rng.random_range(-reach_m..reach_m));
@@ -33,7 +33,7 @@ impl Reference {
     }
 
     /// `∂computed/∂parameter` of all parameters of a chain, a row a pose.
-    pub(super) fn jacobian(&self, chain: &Chain<f64>) -> DMatrix<f64> {
+    fn jacobian(&self, chain: &Chain<f64>) -> DMatrix<f64> {
         let kinematics = Kinematics::new(chain);
         let mut swept = LengthRows::default();
         let mut jacobian = DMatrix::zeros(self.measurements.len(), chain.parameter_count());
@@ -45,6 +45,34 @@ impl Reference {
             }
         }
         jacobian
+    }
+}
+
+/// What of a chain's parameters is dependent in every experiment.
+#[derive(Clone, Debug)]
+pub(super) struct Dependence {
+    /// The parameters that the paper holds.
+    held_in_paper: Vec<bool>,
+    /// Of the reference, a column a parameter.
+    pub(super) jacobian: DMatrix<f64>,
+    rank: usize,
+}
+
+impl Dependence {
+    /// Of a chain as it is written, its joints within these limits.
+    pub(super) fn new(chain: &Chain<f64>, limits: &[JointLimits]) -> Self {
+        let jacobian = Reference::new(chain, limits).jacobian(chain);
+        let rank = Spectrum::new(&jacobian).rank;
+        let held_in_paper = (0..chain.parameter_count()).map(|index| chain.is_conventionally_held(Parameter::from_index(index)));
+        Self { held_in_paper: held_in_paper.collect(), jacobian, rank }
+    }
+
+    /// Independent parameters, ascending: those at `first` before those that the paper frees, and these before the others; none of those
+    /// that are set `apart`.
+    pub(super) fn independent(&self, first: &[usize], apart: &[usize]) -> Vec<usize> {
+        let others = (0..self.held_in_paper.len()).filter(|index| !first.contains(index) && !apart.contains(index));
+        let (last, usual): (Vec<usize>, Vec<usize>) = others.partition(|&index| self.held_in_paper[index]);
+        independent_columns(&[first.to_vec(), usual, last], &self.jacobian, self.rank)
     }
 }
 
