@@ -33,7 +33,7 @@ use crate::unknowns::Unknowns;
 /// those of the frames as they are written.
 ///
 /// With [`FitOptions::plain`] the minimum is the paper's least-squares solution (A. Goswami, A. Quaid and M. Peshkin, IEEE Control Systems 13(5),
-/// 1993); which parameters are free is then found anew for each dataset ([`Identifiability`]).
+/// 1993); which parameters are free is then found anew for each dataset ([`Identifiability`](super::Identifiability)).
 ///
 /// ```
 /// use ballbar_calib::designs;
